@@ -23,29 +23,12 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-SCENE = f"""
-name = "tube"
-[vessel]
-file = "{ROOT}/assets/vessels/curved_tube.stl"
-[device]
-file = "{ROOT}/assets/devices/wire_035_soft.toml"
-[sheath]
-position_mm = [0.0, 0.0, 1.0]
-direction = [0.0, 0.0, 1.0]
-[method]
-name = "kirchhoff"
-element_mm = 4.0
-[[script]]
-advance_mm = 120.0
-step_mm = 0.4
-[view]
-views = VIEWS
-every = 10
-size_px = [64, 64]
-"""
+SCENE = ROOT / "assets" / "scenes" / "curved_tube_exact.toml"
+#: The same for all, of the coarser elements that are fast enough to be killed often.
+SET = {"method.element_mm": "4.0", "script": "[{ advance_mm = 120.0, step_mm = 0.4 }]", "view.views": "[]"}
 DATASET = f"""
 seed = 7
-scenes = ["{ROOT}/assets/scenes/curved_tube_exact.toml"]
+scenes = ["{SCENE}"]
 devices = ["{ROOT}/assets/devices/wire_035_soft.toml"]
 poses = 24
 moments = 4
@@ -53,16 +36,17 @@ moments = 4
 size_px = [96, 96]
 bits = 8
 """
-SWEEP = """
-scene = "scene.toml"
+SWEEP = f"""
+scene = "{SCENE}"
 seed = 1
 samples = 4
 record = "shapes"
 [set]
-"script[0].step_mm" = 4.0
+"method.element_mm" = 4.0
+"script" = [{{ advance_mm = 120.0, step_mm = 4.0 }}]
 [[axis]]
 key = "vessel.wall.friction"
-random = { from = 0.0, to = 0.3 }
+random = {{ from = 0.0, to = 0.3 }}
 """
 #: Values of summary.json that tell how long something took, and in which folder.
 ELSEWHERE = ("step_time_s", "wall_time_s", "scene_file")
@@ -163,6 +147,13 @@ for episode in range(before, 6):
             break
 log.close()
 """
+
+
+def settings(keys: dict[str, str]) -> list[str]:
+    """Keys of the scene, as options of a command."""
+    return [part for key, value in keys.items() for part in ("--set", f"{key}={value}")]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", type=Path)
@@ -175,26 +166,26 @@ def main() -> None:
 
         def place(name: str) -> Path:
             (outer / name).mkdir()
-            (outer / f"{name}.toml").write_text(SCENE.replace("VIEWS", '["fluoro"]' if name == "runs" else "[]"))
             return outer / name
 
         folder = place("runs")
-        run = [program, "run", "../../runs.toml", "--out", "out", "--quiet", "--save-state", "state", "--resume", "state"]
+        pictures = settings({**SET, "view.views": '["fluoro"]', "view.every": "10", "view.size_px": "[64, 64]"})
+        run = [program, "run", str(SCENE), *pictures, "--out", "out", "--quiet", "--save-state", "state", "--resume", "state"]
         check("runs", run, folder, args.tries, draw, whole)
 
         folder = place("datasets")
         (outer / "set.toml").write_text(DATASET)
         check("data sets", [program, "dataset", "../../set.toml", "--out", "out", "--allow-unconverged"], folder, args.tries, draw, whole)
 
-        folder = place("scene")
+        folder = place("sweeps")
         (outer / "sweep.toml").write_text(SWEEP)
         sweep = [program, "sweep", "../../sweep.toml", "--out", "out", "--jobs", "2"]
         check("sweeps", sweep, folder, args.tries, draw, whole)
 
-        folder = place("session")
+        folder = place("sessions")
         lines = [{"do": "move", "mm_per_s": 8.0, "deg_per_s": 0.0}] + [{"do": "wait", "ticks": 60}] * 300
         (outer / "inputs.jsonl").write_text("\n".join(json.dumps(line) for line in lines) + "\n")
-        play = [program, "play", "../../session.toml", "--headless", "--inputs", "../../inputs.jsonl", "--record", "out/played.toml", "--size", "64"]
+        play = [program, "play", str(SCENE), *settings(SET), "--headless", "--inputs", "../../inputs.jsonl", "--record", "out/played.toml", "--size", "64"]
         check("sessions", play, folder, max(1, args.tries // 3), draw, whole)
 
         if args.python:

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use endowire_core::{Error, Result, Vec3};
-use endowire_recording::table::{read_if_any, read_or};
+use endowire_recording::table::read_other;
 use endowire_recording::{
     About, INJECTIONS, INSTRUMENTS, InjectionRow, InstrumentRow, Outlet, PACKING, PackingRow, Rows, STEPS,
     SUMMARY, StepRow,
@@ -30,7 +30,7 @@ pub(crate) fn read_record(folder: &Path) -> Result<Record> {
     let rows = Rows::read(folder, &about)?;
     let (instruments, mut hands) = hands(folder, rows.instruments)?;
     let steps = steps(folder, rows.steps)?;
-    let mut packing = packing(folder, &steps)?;
+    let mut packing = packing(folder, rows.packing, &steps)?;
     let mut samples = Vec::with_capacity(steps.len());
     let table = folder.join(STEPS);
     for step in &steps {
@@ -48,8 +48,7 @@ pub(crate) fn read_record(folder: &Path) -> Result<Record> {
         samples.push(sample);
     }
     in_table(&table, check::forward("step", steps.iter().map(|step| (step.row.step, step.time_s))))?;
-    let last = steps.last().map_or(0, |step| step.row.step);
-    let injections = injections(folder, last)?;
+    let injections = rows.injections.into_iter().map(injection).collect();
     let beam = beam(&folder.join(BEAM))?;
     in_table(&folder.join(BEAM), beam.as_deref().map_or(Ok(()), check::beam))?;
     in_table(&folder.join(SUMMARY), check::place("start_mm", about.start_mm))?;
@@ -142,9 +141,9 @@ fn hands(folder: &Path, rows: Option<Vec<Vec<InstrumentRow>>>) -> Result<(Vec<St
 }
 
 /// How much of a sac coils fill, by step; nothing if there is no table of it.
-fn packing(folder: &Path, steps: &[Step]) -> Result<BTreeMap<usize, Packed>> {
+fn packing(folder: &Path, rows: Option<Vec<PackingRow>>, steps: &[Step]) -> Result<BTreeMap<usize, Packed>> {
     let path = folder.join(PACKING);
-    let Some(rows) = read_if_any::<PackingRow>(&path)? else { return Ok(BTreeMap::new()) };
+    let Some(rows) = rows else { return Ok(BTreeMap::new()) };
     let all: BTreeMap<usize, Packed> = rows.into_iter().map(|row| (row.step, packed(&row))).collect();
     for (step, packed) in &all {
         in_table(&path, check::packed(&entry(*step), packed))?;
@@ -152,16 +151,6 @@ fn packing(folder: &Path, steps: &[Step]) -> Result<BTreeMap<usize, Packed>> {
     match steps.iter().find(|step| !all.contains_key(&step.row.step)) {
         Some(step) => refused(&path, "step", step.row.step, &format!("is missing, and {STEPS} has it")),
         None => Ok(all),
-    }
-}
-
-/// The injections, none of them after the last step.
-fn injections(folder: &Path, last: usize) -> Result<Vec<Injection>> {
-    let path = folder.join(INJECTIONS);
-    let rows = read_if_any::<InjectionRow>(&path)?.unwrap_or_default();
-    match rows.iter().find(|row| row.after_step > last) {
-        Some(row) => refused(&path, "after_step", row.after_step, &format!("{STEPS} ends with step {last}")),
-        None => Ok(rows.into_iter().map(injection).collect()),
     }
 }
 
@@ -190,7 +179,7 @@ fn hand_of(row: &StepRow) -> Hand {
         advance_mm: row.advance_mm,
         rotate_rad: row.rotate_rad,
         inserted_mm: row.inserted_mm,
-        push_force_n: row.push_force_n.is_finite().then_some(row.push_force_n),
+        push_force_n: Some(row.push_force_n),
         torque_nmm: row.torque_nmm,
         ..Hand::default()
     }
@@ -229,5 +218,5 @@ fn injection(row: InjectionRow) -> Injection {
 /// The log of the beam, which no run writes.
 fn beam(path: &Path) -> Result<Option<Vec<BeamState>>> {
     const COLUMNS: &str = "a row of this log has time_s, on (true or false), frames_per_s, dose_ngy, field_mm2, primary_deg and secondary_deg";
-    if path.exists() { read_or(path, COLUMNS).map(Some) } else { Ok(None) }
+    if path.exists() { read_other(path, COLUMNS).map(Some) } else { Ok(None) }
 }

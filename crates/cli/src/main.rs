@@ -11,10 +11,18 @@ mod subjects;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory, FromArgMatches};
+
+/// A command whose options take negative numbers: whether they may be negative is said by what each of them is for.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let takes = |one: &clap::Arg| !one.is_positional() && one.get_action().takes_values();
+    let options = command.mut_args(|one| if takes(&one) { one.allow_negative_numbers(true) } else { one });
+    options.mut_subcommands(with_negative_numbers)
+}
 
 fn main() -> ExitCode {
-    let args = args::Args::parse();
+    let given = with_negative_numbers(args::Args::command()).get_matches();
+    let args = args::Args::from_arg_matches(&given).unwrap_or_else(|error| error.exit());
     if matches!(
         args.command,
         args::Command::Run(_)

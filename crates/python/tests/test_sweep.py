@@ -10,41 +10,25 @@ import pytest
 
 import endowire
 
-VESSEL = Path(__file__).parents[3] / "assets" / "vessels" / "curved_tube.stl"
+SCENE = Path(__file__).parents[3] / "assets" / "scenes" / "curved_tube_exact.toml"
 
-SCENE = f"""
-[vessel]
-file = {json.dumps(str(VESSEL))}
-[[device.section]]
-length_mm = 200.0
-radius_mm = 0.445
-bending_stiffness_nmm2 = 5.0
-[sheath]
-position_mm = [0.0, 0.0, 1.0]
-direction = [0.0, 0.0, 1.0]
-[method]
-name = "kirchhoff"
-element_mm = 4.0
-[[script]]
-advance_mm = 40.0
-step_mm = 2.0
-"""
-
-SWEEP = """
-scene = "scene.toml"
+SWEEP = f"""
+scene = {json.dumps(str(SCENE))}
 samples = 4
+[set]
+"method.element_mm" = 4.0
+"script" = [{{ advance_mm = 40.0, step_mm = 2.0 }}]
 [[axis]]
 key = "device.section[0].radius_mm"
 list = [0.4, 40.0]
 [[axis]]
 key = "device.section[0].bending_stiffness_nmm2"
-random = { from = 1.0, to = 20.0 }
+random = {{ from = 1.0, to = 20.0 }}
 """
 
 
 @pytest.fixture
 def path(tmp_path):
-    (tmp_path / "scene.toml").write_text(SCENE)
     (tmp_path / "sweep.toml").write_text(SWEEP)
     return tmp_path / "sweep.toml"
 

@@ -57,15 +57,17 @@ columns! {
 pub(crate) struct CoilTable {
     path: PathBuf,
     /// `None` before the first coil.
-    table: Option<StepTable>,
+    pub(crate) table: Option<StepTable>,
     /// The coils as in their last rows.
     reported: Vec<DetachedCoil>,
+    /// Those that the last step has detached or moved, which may be taken back.
+    next: Vec<(usize, DetachedCoil)>,
 }
 
 impl CoilTable {
     /// The table of a new recording in `folder`.
     pub(crate) fn new(folder: &Path) -> Self {
-        Self { path: folder.join(COILS), table: None, reported: Vec::new() }
+        Self { path: folder.join(COILS), table: None, reported: Vec::new(), next: Vec::new() }
     }
 
     /// The table of a recording that resumes after step `steps`; rows of later steps are dropped.
@@ -81,7 +83,7 @@ impl CoilTable {
 
     /// Adds the rows of a step.
     pub(crate) fn push(&mut self, step: usize, simulation: &Simulation) -> io::Result<()> {
-        let mut moved = false;
+        self.next.clear();
         for (number, coil) in simulation.coils().iter().enumerate() {
             if self.reported.get(number).is_some_and(|was| moved_mm(coil, was) <= MOVED_MM) {
                 continue;
@@ -92,26 +94,24 @@ impl CoilTable {
             };
             let instrument = &simulation.stack().instruments()[coil.instrument].name;
             rows_of(step, number, instrument, &coil.shape).try_for_each(|row| table.push(row))?;
-            match self.reported.get_mut(number) {
-                Some(reported) => reported.clone_from(coil),
-                None => self.reported.push(coil.clone()),
-            }
-            moved = true;
+            self.next.push((number, coil.clone()));
         }
-        match &mut self.table {
-            Some(table) if moved => table.flush(),
-            _ => Ok(()),
+        Ok(())
+    }
+
+    /// Takes the last step's coils for those that are recorded.
+    pub(crate) fn keep(&mut self) {
+        for (number, coil) in self.next.drain(..) {
+            match self.reported.get_mut(number) {
+                Some(reported) => *reported = coil,
+                None => self.reported.push(coil),
+            }
         }
     }
 
     /// The coils as in their last rows.
     pub(crate) fn reported(&self) -> &[DetachedCoil] {
         &self.reported
-    }
-
-    /// Syncs all rows to disk.
-    pub(crate) fn sync(&self) -> io::Result<()> {
-        self.table.as_ref().map_or(Ok(()), StepTable::sync)
     }
 }
 

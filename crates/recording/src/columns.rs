@@ -41,14 +41,29 @@ pub(crate) fn unit(name: &str) -> Option<&'static str> {
     UNITS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| *unit)
 }
 
+/// A row of a table of a recording.
+pub trait Row {
+    /// Name and value of the first number that is infinite or NaN, which no table may have.
+    fn not_finite(&self) -> Option<(&'static str, f64)>;
+}
+
 /// A value of a cell.
 pub(crate) trait Cell {
     const KIND: &'static str;
     const OPTIONAL: bool = false;
+
+    /// The value, if it is infinite or NaN.
+    fn not_finite(&self) -> Option<f64> {
+        None
+    }
 }
 
 impl Cell for f64 {
     const KIND: &'static str = "number";
+
+    fn not_finite(&self) -> Option<f64> {
+        Some(*self).filter(|number| !number.is_finite())
+    }
 }
 
 impl Cell for bool {
@@ -74,10 +89,43 @@ impl Cell for u32 {
 impl<T: Cell> Cell for Option<T> {
     const KIND: &'static str = T::KIND;
     const OPTIONAL: bool = true;
+
+    fn not_finite(&self) -> Option<f64> {
+        self.as_ref()?.not_finite()
+    }
 }
 
-/// Declares the type of a table's rows, and its columns as `COLUMNS`, from fields with their meanings.
+/// Declares the type of a table's rows, and its columns as `COLUMNS`, from fields with their meanings. `..hand` stands for
+/// the columns of a hand and what it moves, which tables of steps and of instruments have alike.
 macro_rules! columns {
+    (
+        $(#[doc = $about:literal])+
+        pub struct $row:ident {
+            $($(#[doc = $before_means:literal])+ pub $before:ident: $before_kind:ty,)+
+            ..hand,
+            $($(#[doc = $meaning:literal])+ pub $name:ident: $kind:ty,)+
+        }
+    ) => {
+        $crate::columns::columns! {
+            $(#[doc = $about])+
+            pub struct $row {
+                $($(#[doc = $before_means])+ pub $before: $before_kind,)+
+                /// Advance of the hand in the step; negative when pulled back.
+                pub advance_mm: f64,
+                /// Rotation of the hand in the step.
+                pub rotate_rad: f64,
+                /// Length beyond the sheath's mouth.
+                pub inserted_mm: f64,
+                /// Rotation of the hand since the start.
+                pub rotation_rad: Option<f64>,
+                /// Rotation at the sheath's mouth: the hand's, less the twist of the tail between.
+                pub mouth_rotation_rad: Option<f64>,
+                /// Rotation of the tip, against a frame that is carried along the device without twist.
+                pub tip_rotation_rad: Option<f64>,
+                $($(#[doc = $meaning])+ pub $name: $kind,)+
+            }
+        }
+    };
     (
         $(#[doc = $about:literal])+
         pub struct $row:ident {
@@ -100,6 +148,15 @@ macro_rules! columns {
                     optional: <$kind as crate::columns::Cell>::OPTIONAL,
                 },)+
             ];
+        }
+
+        impl crate::columns::Row for $row {
+            fn not_finite(&self) -> Option<(&'static str, f64)> {
+                let cells = [
+                    $((stringify!($name), crate::columns::Cell::not_finite(&self.$name)),)+
+                ];
+                cells.into_iter().find_map(|(name, number)| Some((name, number?)))
+            }
         }
     };
 }

@@ -23,18 +23,7 @@ columns! {
         pub step: usize,
         /// Name of the instrument.
         pub instrument: String,
-        /// Advance of its hand in the step; negative when pulled back.
-        pub advance_mm: f64,
-        /// Rotation of its hand in the step.
-        pub rotate_rad: f64,
-        /// Its length beyond the sheath's mouth.
-        pub inserted_mm: f64,
-        /// Rotation of its hand since the start.
-        pub rotation_rad: Option<f64>,
-        /// Its rotation at the sheath's mouth.
-        pub mouth_rotation_rad: Option<f64>,
-        /// Rotation of its tip.
-        pub tip_rotation_rad: Option<f64>,
+        ..hand,
         /// Value to which it is steered.
         pub steer: Option<f64>,
         /// Place of its tip; empty if it is not inserted.
@@ -58,7 +47,7 @@ columns! {
 
 /// Writes the table of a run.
 pub(crate) struct InstrumentTable {
-    table: StepTable,
+    pub(crate) table: StepTable,
 }
 
 impl InstrumentTable {
@@ -102,12 +91,7 @@ impl InstrumentTable {
                 lateral_n: Some(lateral.fold(0.0, |sum, force_n| sum + force_n)),
             })?;
         }
-        self.table.flush()
-    }
-
-    /// Syncs all rows to disk.
-    pub(crate) fn sync(&self) -> io::Result<()> {
-        self.table.sync()
+        Ok(())
     }
 }
 

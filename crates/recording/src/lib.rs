@@ -54,6 +54,7 @@ pub mod seal;
 mod steps;
 mod summary;
 pub mod table;
+mod tables;
 mod vessel;
 
 pub use arrays::SHAPES;

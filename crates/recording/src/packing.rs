@@ -55,9 +55,11 @@ pub struct Packed {
 
 /// Writes the table of a run in a vessel with a sac.
 pub(crate) struct PackingTable {
-    table: StepTable,
+    pub(crate) table: StepTable,
     sac: Sac,
     reported: Packed,
+    /// With the last step, which may be taken back.
+    next: Packed,
 }
 
 impl PackingTable {
@@ -73,7 +75,7 @@ impl PackingTable {
             reported = Packed { density, neck_coverage, outside_mm, ..reported };
         }
         rows.iter().for_each(|row| reported.add(row));
-        Ok(Self { table, reported, sac })
+        Ok(Self { table, reported, next: reported, sac })
     }
 
     /// Adds the row of a step.
@@ -88,19 +90,19 @@ impl PackingTable {
             herniated: packing.herniated,
             dome_force_n: packing.dome_force_n,
         };
-        self.reported.add(&row);
-        self.table.push(&row)?;
-        self.table.flush()
+        self.next = self.reported;
+        self.next.add(&row);
+        self.table.push(row)
+    }
+
+    /// Counts the last step.
+    pub(crate) fn keep(&mut self) {
+        self.reported = self.next;
     }
 
     /// The packing for the summary.
     pub(crate) fn reported(&self) -> Packed {
         self.reported
-    }
-
-    /// Syncs all rows to disk.
-    pub(crate) fn sync(&self) -> io::Result<()> {
-        self.table.sync()
     }
 }
 

@@ -12,18 +12,16 @@ use endowire_core::{Error, Result, Vec3};
 use serde::Serialize;
 
 use crate::arrays::{SHAPES, ShapeArrays};
-use crate::coils::CoilTable;
 use crate::folder::{self, Among, Claim, FRAMES, Replaced};
-use crate::instruments::InstrumentTable;
 use crate::next::{Reached, check_step};
 use crate::outcome::{EndedBy, RunOutcome};
-use crate::packing::{Packed, PackingTable};
+use crate::packing::Packed;
 use crate::provenance::Provenance;
 use crate::recording::Recording;
 use crate::steps::{STEPS, StepRow};
 use crate::summary::{About, Summary};
-use crate::table::{StepTable, step_of};
-use crate::vessel::VesselTables;
+use crate::table::step_of;
+use crate::tables::Tables;
 
 /// Position of the foremost tip, in the sheath's mouth if nothing is inserted: where its way begins, mm.
 pub fn start_mm(simulation: &Simulation) -> Vec3 {
@@ -36,9 +34,7 @@ const CHECKPOINT_S: f64 = 1.0;
 /// Writes a run into a folder, step by step. The folder is locked until it is dropped.
 pub struct Recorder {
     folder: PathBuf,
-    table: StepTable,
-    instruments: InstrumentTable,
-    packing: Option<PackingTable>,
+    tables: Tables,
     arrays: ShapeArrays,
     steps: usize,
     /// Of the steps that this recorder has recorded.
@@ -47,8 +43,6 @@ pub struct Recorder {
     last_s: f64,
     reached: Reached,
     start_mm: Option<Vec3>,
-    coils: CoilTable,
-    vessel: Option<VesselTables>,
     frames: Vec<String>,
     checkpoint: Option<Instant>,
     _claim: Claim,
@@ -80,25 +74,17 @@ impl Recorder {
     /// As [`Self::new`].
     pub fn among(folder: &Path, among: Among, at: &Simulation) -> Result<(Self, Replaced)> {
         let (claim, replaced) = folder::claim(folder, among)?;
-        let start = || -> io::Result<_> {
-            let table = StepTable::new(&folder.join(STEPS))?;
-            let vessel = VesselTables::go_on(folder, 0, at)?;
-            Ok((table, InstrumentTable::new(folder)?, ShapeArrays::new(folder)?, vessel))
-        };
-        let (table, instruments, arrays, vessel) = start().map_err(|e| Error::file(folder, e))?;
+        let start = || -> io::Result<_> { Ok((Tables::new(folder, at)?, ShapeArrays::new(folder)?)) };
+        let (tables, arrays) = start().map_err(|e| Error::file(folder, e))?;
         let recorder = Self {
             folder: folder.to_path_buf(),
-            table,
-            instruments,
-            packing: None,
+            tables,
             arrays,
             steps: 0,
             tally: Tally::default(),
             last_s: 0.0,
             reached: Reached::of(at),
             start_mm: Some(start_mm(at)),
-            coils: CoilTable::new(folder),
-            vessel,
             frames: Vec::new(),
             checkpoint: None,
             _claim: claim,
@@ -154,25 +140,20 @@ impl Recorder {
                 Some(_) => ShapeArrays::go_on(folder, kept.rows)?,
                 None => ShapeArrays::anew(folder)?,
             };
-            let table = StepTable::cut(&table_path, kept.bytes)?;
             folder::remove_frames(folder)?;
-            let vessel = VesselTables::go_on(folder, steps, at)?;
-            Ok((table, InstrumentTable::go_on(folder, steps)?, arrays, vessel))
+            Ok(arrays)
         };
-        let (table, instruments, arrays, vessel) = start().map_err(|e| Error::file(folder, e))?;
+        let arrays = start().map_err(|e| Error::file(folder, e))?;
+        let tables = Tables::go_on(folder, (steps, kept.bytes), at)?;
         let recorder = Self {
             folder: folder.to_path_buf(),
-            table,
-            instruments,
-            packing: None,
+            tables,
             arrays,
             steps,
             tally: Tally::default(),
             last_s: last_s.unwrap_or_default(),
             reached: Reached::of(at),
             start_mm,
-            coils: CoilTable::go_on(folder, at.stack(), steps)?,
-            vessel,
             frames: Vec::new(),
             checkpoint: None,
             _claim: claim,
@@ -185,9 +166,7 @@ impl Recorder {
     /// # Errors
     /// A table that cannot be written, and a sac that does not belong to the simulation.
     pub fn pack(&mut self, sac: Option<Sac>, simulation: &Simulation) -> Result<()> {
-        let table = |sac| PackingTable::go_on(&self.folder, sac, self.steps, simulation);
-        self.packing = sac.map(table).transpose()?;
-        Ok(())
+        self.tables.pack(&self.folder, sac, self.steps, simulation)
     }
 
     /// Records the step that the simulation has just carried out with these moves, which ends at `time_s`; if that
@@ -207,21 +186,15 @@ impl Recorder {
             return Err(Error::content(&self.folder, text));
         }
         let row = StepRow::of(step, moves, time_s, simulation);
-        // Written last, so that every step of the table is also in the arrays.
-        let write_row = || {
-            self.instruments.push(step, moves, simulation)?;
-            if let Some(packing) = &mut self.packing {
-                packing.push(step, simulation)?;
-            }
-            self.coils.push(step, simulation)?;
-            if let Some(vessel) = &mut self.vessel {
-                vessel.push(step, simulation)?;
-            }
-            self.table.push(&row)?;
-            self.table.flush()
-        };
-        let pushed = self.arrays.push(simulation.shape(), simulation.report(), write_row);
-        pushed.map_err(|error| Error::file(&self.folder, error))?;
+        // Split, because the arrays keep a step only if everything else of it is written.
+        let Self { arrays, tables, .. } = self;
+        let write_rows = || tables.write(row, moves, simulation);
+        let pushed = arrays.push(simulation.shape(), simulation.report(), write_rows);
+        if let Err(error) = pushed {
+            tables.take_back();
+            return Err(Error::file(&self.folder, error));
+        }
+        tables.keep();
         self.steps += 1;
         (self.last_s, self.reached) = (time_s, Reached::of(simulation));
         self.tally.count(self.steps, simulation);
@@ -230,12 +203,12 @@ impl Recorder {
 
     /// Packing of the scene's sac, if it has one.
     pub fn packed(&self) -> Option<Packed> {
-        self.packing.as_ref().map(PackingTable::reported)
+        self.tables.packed()
     }
 
     /// Detached coils after the last step.
     pub fn coils(&self) -> &[DetachedCoil] {
-        self.coils.reported()
+        self.tables.coils()
     }
 
     /// The summary so far of a program that moves the simulation by itself. Where that is of a scene, add name and file.
@@ -287,11 +260,7 @@ impl Recorder {
     pub fn sync(&self) -> Result<()> {
         let synced = || -> io::Result<()> {
             self.arrays.sync()?;
-            self.instruments.sync()?;
-            self.packing.as_ref().map_or(Ok(()), PackingTable::sync)?;
-            self.coils.sync()?;
-            self.vessel.as_ref().map_or(Ok(()), VesselTables::sync)?;
-            self.table.sync()
+            self.tables.sync()
         };
         synced().map_err(|e| Error::file(&self.folder, e))
     }
@@ -300,7 +269,7 @@ impl Recorder {
     /// deleted.
     fn check_there(&self) -> Result<()> {
         let path = self.folder.join(STEPS);
-        match (self.table.bytes(), path.metadata()) {
+        match (self.tables.bytes_of_steps(), path.metadata()) {
             (Ok(own), Ok(there)) if there.len() == own => Ok(()),
             _ => Err(Error::Computation(format!(
                 "{}: was removed or replaced while the run went on, and steps with it; run the scene again",

@@ -81,11 +81,34 @@ impl Recording {
         recording.left_out = left_out.or_else(|| (count != steps.len()).then(differ));
         steps.truncate(count);
         recording.truncate(steps.len());
+        recording.check_numbers()?;
         for (index, row) in steps.iter().enumerate() {
             recording.check_row(index, row)?;
         }
         recording.rows = steps;
         Ok(recording)
+    }
+
+    /// Checks that all numbers of the arrays are finite.
+    fn check_numbers(&self) -> Result<()> {
+        let nodes = ..self.offsets[self.steps()];
+        let contacts = ..self.contact_offsets[self.steps()];
+        let of_vectors = |all: &[Vec3]| all.iter().position(|one| !one.iter().all(|x| x.is_finite()));
+        let wrong = [
+            (arrays::POSITIONS, of_vectors(&self.positions[nodes])),
+            (arrays::TANGENTS, of_vectors(&self.tangents[nodes])),
+            (arrays::FROM_TIP, self.from_tip[nodes].iter().position(|x| !x.is_finite())),
+            (arrays::CONTACT_POSITIONS, of_vectors(&self.contact_points[contacts])),
+            (arrays::CONTACT_FORCES, of_vectors(&self.contact_forces[contacts])),
+        ];
+        match wrong.into_iter().find_map(|(member, row)| Some((member, row?))) {
+            Some((member, row)) => {
+                let what =
+                    format!("{}[{row}]: must be finite: run the scene again (endowire run)", member.name);
+                Err(Error::content(&self.folder.join(SHAPES), what))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Checks that the row of a step is that of its shape.
@@ -399,6 +422,19 @@ mod tests {
         killed(packed.path()).pack(packed.path()).unwrap();
         let refused = damaged_copies(packed.path(), &packed.path().join(SHAPES), &mut noise);
         assert!(refused > 600, "{refused}: the archive's own sums find most damage");
+    }
+
+    #[test]
+    fn an_array_with_a_number_that_is_not_finite_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        killed(folder.path());
+        let path = folder.path().join(GROWING).join(arrays::TANGENTS.file_name());
+        let mut bytes = std::fs::read(&path).unwrap();
+        // The tangent of the second node, along z.
+        bytes[40..48].copy_from_slice(&f64::NAN.to_le_bytes());
+        std::fs::write(&path, bytes).unwrap();
+        let reported = Recording::read(folder.path()).unwrap_err().to_string();
+        assert!(reported.contains("tangents[1]: must be finite"), "{reported}");
     }
 
     #[test]

@@ -9,10 +9,14 @@ use std::path::Path;
 use endowire_core::{Error, Result};
 use serde::de::DeserializeOwned;
 
+use crate::coils::{COILS, CoilRow};
+use crate::columns::Row;
+use crate::injections::{INJECTIONS, InjectionRow};
 use crate::instruments::{INSTRUMENTS, InstrumentRow};
+use crate::packing::{PACKING, PackingRow};
 use crate::steps::{STEPS, StepRow};
 use crate::summary::{About, SUMMARY};
-use crate::table::{self, GIVE};
+use crate::table;
 use crate::vessel::{PLACES, PlaceRow, UnknownRow, VESSEL};
 
 /// The remedy for tables that do not fit each other.
@@ -28,6 +32,10 @@ pub struct Rows {
     pub steps: Vec<StepRow>,
     /// Those of instruments.csv for each of these steps, each time of the same instruments; `None` without that table.
     pub instruments: Option<Vec<Vec<InstrumentRow>>>,
+    /// Those of packing.csv, which may begin with a later step and then has every one; `None` without that table.
+    pub packing: Option<Vec<PackingRow>>,
+    /// Those of injections.csv, in order of time.
+    pub injections: Vec<InjectionRow>,
     /// What was left out of a run that was killed, in words.
     pub left_out: Option<String>,
 }
@@ -40,17 +48,16 @@ impl Rows {
     /// [`Error::Content`] naming a table that is missing or damaged, or is of other steps than the others, and the line.
     pub fn read(folder: &Path, about: &About) -> Result<Self> {
         let path = folder.join(STEPS);
-        let (steps, is_cut) = table::read_cut::<StepRow>(&path, GIVE)?;
+        let (steps, is_cut) = table::read_cut::<StepRow>(&path)?;
         check_steps(&path, &steps, about)?;
         let is_killed = !about.is_complete();
         if is_cut && !is_killed {
-            let but = format!("{SUMMARY} says that the run has ended, and this row is cut");
-            return refused(&path, "line", steps.len() + 2, &but);
+            return refused_cut(&path, steps.len());
         }
         let cut_row = || format!("the row of line {} of {STEPS} is cut", steps.len() + 2);
         let mut left_out = is_cut.then(cut_row);
         let mut whole = steps.len();
-        let of = Of { folder, steps: &steps, is_killed };
+        let of = Of { folder, steps: &steps, instruments: &about.instruments, is_killed };
         let mut shorten = |name: &str, count: usize| {
             if count < whole {
                 whole = count;
@@ -61,6 +68,10 @@ impl Rows {
         let instruments = of.rows((INSTRUMENTS, "instrument"), about.instruments.clone(), named)?;
         let unknowns = of.rows((VESSEL, "unknown"), vec![], |row: &UnknownRow| (row.step, row.unknown))?;
         let places = of.rows((PLACES, "place"), vec![], |row: &PlaceRow| (row.step, row.place.clone()))?;
+        let (packing, packed) = of.packing()?;
+        shorten(PACKING, packed);
+        shorten(COILS, of.check_coils()?);
+        let (injections, is_shorter) = of.injections()?;
         let yields = steps.iter().any(|row| row.vessel_displacement_mm.is_some_and(|by_mm| by_mm > 0.0));
         for (name, count, is_due) in [
             (INSTRUMENTS, instruments.as_ref().map(Vec::len), !about.instruments.is_empty()),
@@ -79,17 +90,25 @@ impl Rows {
                 None => {}
             }
         }
-        let mut rows = Self { steps, instruments, left_out };
+        if is_shorter {
+            left_out.get_or_insert_with(|| format!("{INJECTIONS} has some after later steps"));
+        }
+        let mut rows = Self { steps, instruments, packing, injections, left_out };
         rows.truncate(whole);
         Ok(rows)
     }
 
     /// Drops all but the first steps.
-    pub(crate) fn truncate(&mut self, steps: usize) {
+    fn truncate(&mut self, steps: usize) {
         self.steps.truncate(steps);
+        let last = self.steps.last().map_or(0, |row| row.step);
         if let Some(instruments) = &mut self.instruments {
             instruments.truncate(steps);
         }
+        if let Some(packing) = &mut self.packing {
+            packing.retain(|row| row.step <= last);
+        }
+        self.injections.retain(|row| row.after_step <= last);
     }
 }
 
@@ -115,23 +134,37 @@ fn check_steps(path: &Path, steps: &[StepRow], about: &About) -> Result<()> {
 struct Of<'a> {
     folder: &'a Path,
     steps: &'a [StepRow],
+    /// Names of the instruments; empty where nothing says them.
+    instruments: &'a [String],
     is_killed: bool,
 }
 
 impl Of<'_> {
     /// The rows of a table for each of these steps in turn; `None` without the table. `key` are the step of a row, and what
     /// is different in each row of a step: these are the same in every step, and are `known` if they are not empty.
-    fn rows<T: DeserializeOwned, K: PartialEq + Display>(
+    fn rows<T: DeserializeOwned + Row, K: PartialEq + Display>(
         &self,
         (name, what): (&str, &str),
-        mut known: Vec<K>,
+        known: Vec<K>,
         key: impl Fn(&T) -> (usize, K),
     ) -> Result<Option<Vec<Vec<T>>>> {
         let path = self.folder.join(name);
         if !path.exists() {
             return Ok(None);
         }
-        let (rows, is_cut) = table::read_cut::<T>(&path, GIVE)?;
+        let read = table::read_cut::<T>(&path)?;
+        self.grouped((name, what), read, known, key).map(Some)
+    }
+
+    /// As [`Self::rows`], of rows that were read, with whether the last one is cut.
+    fn grouped<T, K: PartialEq + Display>(
+        &self,
+        (name, what): (&str, &str),
+        (rows, is_cut): (Vec<T>, bool),
+        mut known: Vec<K>,
+        key: impl Fn(&T) -> (usize, K),
+    ) -> Result<Vec<Vec<T>>> {
+        let path = self.folder.join(name);
         let mut all: Vec<Vec<T>> = Vec::new();
         let mut line = 2;
         let mut rows = rows.into_iter().peekable();
@@ -182,7 +215,109 @@ impl Of<'_> {
                 &format!("is missing from line {line} on, and {STEPS} has it"),
             );
         }
-        Ok(Some(all))
+        Ok(all)
+    }
+
+    /// The rows of packing.csv, and the number of steps that it allows: it has a row for each step from its first one on.
+    fn packing(&self) -> Result<(Option<Vec<PackingRow>>, usize)> {
+        let path = self.folder.join(PACKING);
+        let count = self.steps.len();
+        if !path.exists() {
+            return Ok((None, count));
+        }
+        let (rows, is_cut) = table::read_cut::<PackingRow>(&path)?;
+        let Some(first) = rows.first().map(|row| row.step) else { return Ok((Some(rows), count)) };
+        let before = self.steps.iter().take_while(|row| row.step < first).count();
+        let later = Of { steps: &self.steps[before..], ..*self };
+        let packed = |row: &PackingRow| (row.step, "packing");
+        let rows = later.grouped((PACKING, "rows"), (rows, is_cut), vec!["packing"], packed)?;
+        let count = before + rows.len();
+        Ok((Some(rows.into_iter().flatten().collect()), count))
+    }
+
+    /// Checks coils.csv, and returns the number of steps that it allows: its rows are in order of steps and coils, those of
+    /// a coil after a step lead to the coil's tip, and a coil is the next one where it first appears.
+    fn check_coils(&self) -> Result<usize> {
+        let path = self.folder.join(COILS);
+        let count = self.steps.len();
+        if !path.exists() {
+            return Ok(count);
+        }
+        let (rows, is_cut) = table::read_cut::<CoilRow>(&path)?;
+        if is_cut && !self.is_killed {
+            return refused_cut(&path, rows.len());
+        }
+        let (mut line, mut coils, mut before) = (2, 0, None);
+        let mut groups = rows.chunk_by(|a, b| (a.step, a.coil) == (b.step, b.coil)).peekable();
+        while let Some(group) = groups.next() {
+            let CoilRow { step, coil, ref instrument, .. } = group[0];
+            let refused = |name: &str, value: &dyn Display, but: &str| {
+                refused(&path, &format!("line {line}: {name}"), value, but)
+            };
+            if !self.steps.iter().any(|row| row.step == step) {
+                if self.is_killed && self.steps.last().is_none_or(|last| step > last.step) {
+                    break;
+                }
+                return refused("step", &step, &format!("is no step of {STEPS}"));
+            }
+            if before.is_some_and(|before| (step, coil) <= before) {
+                return refused("coil", &coil, &format!("of step {step} comes after coils of later rows"));
+            }
+            if coil > coils {
+                return refused("coil", &coil, &format!("comes first, and {coils} is the next one"));
+            }
+            self.check_instrument(&path, line, instrument)?;
+            let end_mm = group.last().map_or(0.0, |row| row.from_tip_mm);
+            if end_mm != 0.0 {
+                if self.is_killed && groups.peek().is_none() {
+                    return Ok(self.steps.iter().take_while(|row| row.step < step).count());
+                }
+                let but = format!("is where coil {coil} ends in step {step}, and not its tip");
+                return refused("from_tip_mm", &end_mm, &but);
+            }
+            (before, coils) = (Some((step, coil)), coils.max(coil + 1));
+            line += group.len();
+        }
+        Ok(count)
+    }
+
+    /// The rows of injections.csv, which are in order of time and of steps, and whether there are some after later steps.
+    fn injections(&self) -> Result<(Vec<InjectionRow>, bool)> {
+        let path = self.folder.join(INJECTIONS);
+        let mut rows = table::read_if_any::<InjectionRow>(&path)?.unwrap_or_default();
+        let last = self.steps.last().map_or(0, |row| row.step);
+        let count = rows.len();
+        if self.is_killed {
+            // These are synced at once, and steps once a second: a power failure may have taken the steps before them.
+            rows.retain(|row| row.after_step <= last);
+        }
+        let is_shorter = rows.len() < count;
+        let (mut after_step, mut time_s) = (0, 0.0);
+        for (row, line) in rows.iter().zip(2..) {
+            let refused = |name: &str, value: &dyn Display, but: &str| {
+                refused(&path, &format!("line {line}: {name}"), value, but)
+            };
+            if row.after_step > last {
+                return refused("after_step", &row.after_step, &format!("{STEPS} ends with step {last}"));
+            }
+            if row.after_step < after_step {
+                return refused("after_step", &row.after_step, &format!("comes after {after_step}"));
+            }
+            if row.time_s < time_s {
+                return refused("time_s", &row.time_s, &format!("comes after {time_s}"));
+            }
+            self.check_instrument(&path, line, &row.instrument)?;
+            (after_step, time_s) = (row.after_step, row.time_s);
+        }
+        Ok((rows, is_shorter))
+    }
+
+    fn check_instrument(&self, path: &Path, line: usize, name: &str) -> Result<()> {
+        if self.instruments.is_empty() || self.instruments.iter().any(|one| one == name) {
+            return Ok(());
+        }
+        let but = format!("those of the run are [{}]", list(self.instruments));
+        refused(path, &format!("line {line}: instrument"), name, &but)
     }
 }
 
@@ -195,6 +330,12 @@ fn list(keys: &[impl Display]) -> String {
         }
         _ => texts.join(", "),
     }
+}
+
+/// Refuses a table of a run that has ended and has so many whole rows, and then part of one.
+fn refused_cut<T>(path: &Path, rows: usize) -> Result<T> {
+    let but = format!("{SUMMARY} says that the run has ended, and this row is cut");
+    refused(path, "line", rows + 2, &but)
 }
 
 /// Refuses a table with a value that contradicts what the others say.

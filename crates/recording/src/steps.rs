@@ -12,23 +12,13 @@ use crate::table;
 pub const STEPS: &str = "steps.csv";
 
 columns! {
-    /// A row of steps.csv: what was done in a step, and the state after it. Columns that earlier versions did not write,
-    /// and those that a table written by hand may leave out, are `None` there.
+    /// A row of steps.csv: what was done in a step, and the state after it. With several instruments, advance and rotation
+    /// in the step are those of the hand that moved first, other rotations those of the innermost one.
+    /// Columns that earlier versions did not write, and those that a table written by hand may leave out, are `None` there.
     pub struct StepRow {
         /// Number of the step, from 1.
         pub step: usize,
-        /// Advance of the hand in the step; negative when pulled back. With several instruments, of the one that moved first.
-        pub advance_mm: f64,
-        /// Rotation of the hand in the step.
-        pub rotate_rad: f64,
-        /// Length beyond the sheath's mouth.
-        pub inserted_mm: f64,
-        /// Rotation of the hand since the start.
-        pub rotation_rad: Option<f64>,
-        /// Rotation of the device at the sheath's mouth: the hand's, less the twist of the tail between.
-        pub mouth_rotation_rad: Option<f64>,
-        /// Rotation of the tip, against a frame that is carried along the device without twist.
-        pub tip_rotation_rad: Option<f64>,
+        ..hand,
         /// Number of nodes.
         pub nodes: usize,
         /// Place of the foremost tip; 0 where nothing is inserted.
@@ -77,7 +67,7 @@ columns! {
         pub converged: Option<bool>,
         /// Parts of the command in which the device moved until it came to rest.
         pub relaxations: Option<u32>,
-        /// Force out of balance after a relaxation, over the largest force in the device.
+        /// Force out of balance after a relaxation, over the largest force in the device; empty where none was found.
         pub imbalance: Option<f64>,
         /// Energy released in jumps.
         pub released_mj: Option<f64>,
@@ -135,7 +125,7 @@ impl StepRow {
             angles: Some(report.angles),
             converged: Some(!report.has_failed()),
             relaxations: Some(report.relaxations),
-            imbalance: Some(report.imbalance),
+            imbalance: Some(report.imbalance).filter(|part| part.is_finite()),
             released_mj: Some(report.jump.map_or(0.0, |jump| jump.released_mj)),
             wall_force_sum_n: Some(force.sum_n),
             wall_force_largest_n: Some(force.largest_n),

@@ -57,8 +57,8 @@ columns! {
 
 /// Writes the tables of a run.
 pub(crate) struct VesselTables {
-    unknowns: StepTable,
-    places: StepTable,
+    pub(crate) unknowns: StepTable,
+    pub(crate) places: StepTable,
 }
 
 impl VesselTables {
@@ -91,14 +91,7 @@ impl VesselTables {
                 })?;
             }
         }
-        self.unknowns.flush()?;
-        self.places.flush()
-    }
-
-    /// Syncs all rows to disk.
-    pub(crate) fn sync(&self) -> io::Result<()> {
-        self.unknowns.sync()?;
-        self.places.sync()
+        Ok(())
     }
 }
 

@@ -19,7 +19,7 @@ pub(crate) enum VesselCommand {
         #[command(flatten)]
         frame: CoordinateArgs,
         /// Count septa between lumens that are thinner than so many mm
-        #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
+        #[arg(long, default_value_t = 1.0, value_name = "MM")]
         septum_mm: f64,
         #[command(flatten)]
         repair: RepairArgs,
@@ -76,7 +76,7 @@ pub(crate) enum DeviceCommand {
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(crate) struct CoordinateArgs {
     /// Millimetres per unit of the file
-    #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1.0, value_name = "MM")]
     pub(crate) unit_mm: f64,
     /// Axes of the file, LPS or RAS; if absent, those of its header, or LPS
     #[arg(long, value_name = "AXES")]
@@ -107,7 +107,7 @@ pub(crate) struct FeltArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) felt: Option<PathBuf>,
     /// How far that wall may be from the surface, mm, as vessel.wall.deviation_mm of a scene; 0.1 if absent
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM")]
     pub(crate) deviation_mm: Option<f64>,
     /// Draw that wall (PNG): red where it is inside the surface by that distance, blue where it is outside
     #[arg(long, value_name = "FILE")]
@@ -122,7 +122,7 @@ pub(crate) struct GenerateArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
     /// Length of the triangles' edges; a quarter of the smallest radius if absent
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, conflicts_with = "triangles")]
+    #[arg(long, value_name = "MM", conflicts_with = "triangles")]
     pub(crate) edge_mm: Option<f64>,
     /// Number of triangles, met within a few percent
     #[arg(long, value_name = "COUNT")]
@@ -215,7 +215,7 @@ pub(crate) struct PassableArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) centreline: Option<PathBuf>,
     /// Force along the device, N, below which a section counts as passing a bend freely
-    #[arg(long, default_value_t = NO_FORCE_N, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = NO_FORCE_N, value_name = "N")]
     pub(crate) force_n: f64,
     /// Draw the path through the vessel, coloured by its room, and plot room and bends along it (.png)
     #[arg(long, value_name = "FILE")]

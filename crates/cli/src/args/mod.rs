@@ -196,7 +196,7 @@ pub(crate) struct AssessArgs {
     #[arg(long, requires = "subject")]
     pub(crate) verify: bool,
     /// Distance from the target at which the tip counts as arrived
-    #[arg(long, default_value_t = 5.0, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 5.0, value_name = "MM")]
     pub(crate) within_mm: f64,
     /// Scene file, if it is not the one named in the sessions
     #[arg(long, value_name = "FILE")]

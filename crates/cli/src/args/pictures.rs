@@ -41,11 +41,11 @@ pub(crate) struct FrameArgs {
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
     /// Turn the camera of the 3D view by so many degrees from the first frame to the last
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES")]
     pub(crate) orbit: Option<f64>,
     /// Turn the C-arm by so many degrees (towards LAO) from the first frame to the last; a subtraction has a mask of every angle, of the
     /// first frame's devices. Not where one frame is drawn
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES")]
     pub(crate) turn: Option<f64>,
     /// Speed of that turn, in place of a number of frames, which follows from it and the scene's frames_per_s
     #[arg(long, requires = "turn", value_name = "SPEED")]
@@ -53,7 +53,7 @@ pub(crate) struct FrameArgs {
     /// Draw fluoroscopy in a second plane as well, turned by so many degrees (towards LAO) from the first; the scene's biplane_deg if
     /// absent. What is of it has _b at the end of its name: frames, masks, labels, arrays, the second DICOM file of the pair. Moving
     /// pictures are of the first plane
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES")]
     pub(crate) biplane: Option<f64>,
     /// Write one moving picture of the views side by side: an animated PNG (.png, .apng), a GIF (.gif), or a film (.mp4) where the program
     /// was built with the feature mp4
@@ -117,7 +117,7 @@ pub(crate) struct FluoroArgs {
     #[arg(long, value_name = "STEPS")]
     pub(crate) steps: Option<usize>,
     /// Time of the first frame in seconds, for injections
-    #[arg(long, default_value_t = 0.0, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, value_name = "S")]
     pub(crate) time: f64,
     /// Number of frames, at the scene's frames_per_s
     #[arg(long, default_value_t = 1, value_name = "COUNT", conflicts_with = "deg_per_s")]

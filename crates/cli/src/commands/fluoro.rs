@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use endowire_core::error::number;
 use endowire_core::insertion::{Contact, DetachedCoil, Script, Simulation, Step, Tally};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, VesselMotion};
@@ -16,14 +17,17 @@ use crate::output::frames::flowing;
 use crate::output::{progress, refuse_recording};
 use crate::scenes;
 
+/// Latest time of a first frame, s: the longest wait of a script.
+const LATEST_S: f64 = 1e6;
+
 /// Carries out the script, then draws.
 pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
     if args.count == 0 {
         return Err(Failure::Input("--count 0: draw at least one frame".to_owned()));
     }
-    if !args.time.is_finite() {
-        return Err(Failure::Input(format!("--time {}: must be finite", args.time)));
+    if !(0.0..=LATEST_S).contains(&args.time) {
+        return Err(Failure::Input(format!("--time {}: must be from 0 to {LATEST_S} s", number(args.time))));
     }
     args.out.as_deref().map_or(Ok(()), refuse_recording)?;
     let (settings, _) = scenes::of_scene_and_view(&args.frames.set)?;

@@ -158,6 +158,9 @@ fn wrong_names_are_answered_with_the_nearest_right_one() {
         (["--method", "rigid-link"], "'rigid-links'"),
         (["--elements", "1"], "--elements 1: give 2 to"),
         (["--limit-s", "0"], "--limit-s 0: give a time above 0"),
+        (["--limit-s", "-1"], "--limit-s -1: give a time above 0"),
+        (["--limit-s", "nan"], "--limit-s NaN: give a time above 0"),
+        (["--limit-s", "1e30"], "--limit-s 1e30: give a time above 0, and at most 1000000 s"),
     ] {
         let output = compare(folder.path(), &args);
         let text = said(&output);

@@ -178,6 +178,35 @@ fn tips(run: &Path) -> Vec<[f64; 3]> {
     table.records().map(|row| places.map(|k| row.as_ref().unwrap()[k].parse().unwrap())).collect()
 }
 
+/// What the validator of Khronos finds in a file, which `.ci/run` installs; `None` without it.
+fn issues(file: &Path) -> Option<serde_json::Value> {
+    const VALIDATE: &str = "require('gltf-validator').validateBytes(new Uint8Array(require('fs').readFileSync(process.argv[1]))).then(found => console.log(JSON.stringify(found.issues)))";
+    let modules = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../target/gltf-validator/node_modules"));
+    if !modules.join("gltf-validator").exists() {
+        eprintln!("skipped: gltf-validator is not in {}", modules.display());
+        return None;
+    }
+    let mut node = std::process::Command::new("node");
+    let output = node.env("NODE_PATH", modules).args(["-e", VALIDATE]).arg(file).output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    Some(serde_json::from_slice(&output.stdout).unwrap())
+}
+
+#[test]
+fn the_validator_of_gltf_finds_nothing_in_an_animation() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, out) = exported(folder.path(), "--gltf", "run.glb");
+    let Some(found) = issues(&out) else { return };
+    let counts = |found: &serde_json::Value| [&found["numErrors"], &found["numWarnings"]].map(|n| n.as_u64());
+    assert_eq!(counts(&found), [Some(0); 2], "{found}");
+    // The twin: places of two numbers.
+    let mut bytes = std::fs::read(&out).unwrap();
+    let place = bytes.windows(6).position(|part| part == b"\"VEC3\"").unwrap();
+    bytes[place + 4] = b'2';
+    std::fs::write(&out, bytes).unwrap();
+    assert!(counts(&issues(&out).unwrap())[0] > Some(0));
+}
+
 #[test]
 fn a_run_is_an_animation_that_another_reader_takes() {
     let folder = tempfile::tempdir().unwrap();

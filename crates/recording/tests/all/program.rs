@@ -8,7 +8,7 @@ use endowire_recording::{
     Among, EndedBy, INSTRUMENTS, Program, Provenance, Recorder, Recording, SHAPES, STEPS, SUMMARY, read_steps,
 };
 
-fn simulation() -> Simulation {
+pub(crate) fn simulation() -> Simulation {
     let tree = anatomy::tree("curved_tube").unwrap();
     let vessel = GeneratedWall::new(&tree, Resolution::EdgeMm(3.0)).unwrap();
     let sheath = Sheath::at_opening(&vessel.wall, vessel.inlet, 1.0).unwrap();
@@ -16,11 +16,11 @@ fn simulation() -> Simulation {
     Simulation::builder(vessel.wall, device, sheath).build().unwrap()
 }
 
-fn provenance() -> Provenance {
+pub(crate) fn provenance() -> Provenance {
     Provenance::new(Program { version: "1.0", git_revision: "none" }, &[""; 0], 0)
 }
 
-fn steps(recorder: &mut Recorder, simulation: &mut Simulation, steps: std::ops::Range<usize>) {
+pub(crate) fn steps(recorder: &mut Recorder, simulation: &mut Simulation, steps: std::ops::Range<usize>) {
     for step in steps {
         let moves = [Move { instrument: 0, command: Command::advance(6.0) }];
         simulation.step(moves[0].command).unwrap();
@@ -113,7 +113,7 @@ fn a_damaged_row_is_named_by_its_line_and_column() {
 }
 
 /// The text of a table with a changed line, from 1, or without it.
-fn changed(text: &str, line: usize, to: Option<&str>) -> String {
+pub(crate) fn changed(text: &str, line: usize, to: Option<&str>) -> String {
     let lines = text.lines().enumerate();
     let lines = lines.filter_map(|(index, own)| if index + 1 == line { to } else { Some(own) });
     lines.map(|line| format!("{line}\n")).collect()

@@ -43,7 +43,7 @@ pub(crate) struct TrackArgs {
     #[arg(long, value_name = "FILE|NAME")]
     pub(crate) track: Option<PathBuf>,
     /// Coefficient of friction between device and track
-    #[arg(long, default_value_t = 0.1, value_name = "MU", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.1, value_name = "MU")]
     pub(crate) friction: f64,
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
@@ -57,10 +57,10 @@ pub(crate) struct TorqueArgs {
     #[command(flatten)]
     pub(crate) track: TrackArgs,
     /// Angle through which the hand turns, degrees
-    #[arg(long, default_value_t = 720.0, value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 720.0, value_name = "DEG")]
     pub(crate) turn_deg: f64,
     /// Angle of the hand between two readings, degrees
-    #[arg(long, default_value_t = 7.5, value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 7.5, value_name = "DEG")]
     pub(crate) step_deg: f64,
     #[command(flatten)]
     pub(crate) output: BenchOutputArgs,
@@ -74,7 +74,7 @@ pub(crate) struct PushArgs {
     #[command(flatten)]
     pub(crate) track: TrackArgs,
     /// Length between two readings, mm
-    #[arg(long, default_value_t = 2.5, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 2.5, value_name = "MM")]
     pub(crate) step_mm: f64,
     #[command(flatten)]
     pub(crate) output: BenchOutputArgs,
@@ -86,13 +86,13 @@ pub(crate) struct TipLoadArgs {
     #[arg(required = true, value_name = "DEVICE")]
     pub(crate) devices: Vec<PathBuf>,
     /// Length that sticks out of the holder, mm
-    #[arg(long, default_value_t = 10.0, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 10.0, value_name = "MM")]
     pub(crate) free_length_mm: f64,
     /// How far the surface moves towards the holder from where it touches the tip, mm
-    #[arg(long, default_value_t = 2.0, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 2.0, value_name = "MM")]
     pub(crate) stroke_mm: f64,
     /// Coefficient of friction between tip and surface; with friction a straight tip is held until it buckles, at up to eight times the force
-    #[arg(long, default_value_t = 0.0, value_name = "MU", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, value_name = "MU")]
     pub(crate) friction: f64,
     #[command(flatten)]
     pub(crate) output: BenchOutputArgs,
@@ -104,13 +104,13 @@ pub(crate) struct BendArgs {
     #[arg(required = true, value_name = "DEVICE")]
     pub(crate) devices: Vec<PathBuf>,
     /// Distance between the supports, mm
-    #[arg(long, default_value_t = 20.0, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 20.0, value_name = "MM")]
     pub(crate) span_mm: f64,
     /// Largest deflection, mm, at most a fifth of the span
-    #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1.0, value_name = "MM")]
     pub(crate) deflection_mm: f64,
     /// Distance from the tip, mm, at which the force over the deflection is measured; the middle of each device's longest part if absent
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM")]
     pub(crate) at_mm: Option<f64>,
     #[command(flatten)]
     pub(crate) output: BenchOutputArgs,

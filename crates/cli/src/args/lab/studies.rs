@@ -36,7 +36,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub(crate) elements: Vec<usize>,
     /// Longest time of one solve or insertion
-    #[arg(long, default_value_t = 30.0, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 30.0, value_name = "S")]
     pub(crate) limit_s: f64,
     /// Print the rows as one JSON document on stdout
     #[arg(long)]
@@ -101,25 +101,25 @@ pub(crate) struct CoilArgs {
     )]
     pub(crate) coils: Vec<CoilKind>,
     /// Volume of the sac, mm³
-    #[arg(long, default_value_t = 60.0, value_name = "MM3", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 60.0, value_name = "MM3")]
     pub(crate) volume_mm3: f64,
     /// Length of each coil, mm
-    #[arg(long, default_value_t = 60.0, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 60.0, value_name = "MM")]
     pub(crate) length_mm: f64,
     /// Increment by which coils are pushed, mm
-    #[arg(long, default_value_t = 0.5, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.5, value_name = "MM")]
     pub(crate) step_mm: f64,
     /// Element length, mm
-    #[arg(long, default_value_t = 0.75, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.75, value_name = "MM")]
     pub(crate) element_mm: f64,
     /// Coefficient of friction of the wall
-    #[arg(long, default_value_t = 0.1, value_name = "MU", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.1, value_name = "MU")]
     pub(crate) friction: f64,
     /// Coefficient of friction of coils on themselves and on each other
-    #[arg(long, default_value_t = 0.2, value_name = "MU", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.2, value_name = "MU")]
     pub(crate) self_friction: f64,
     /// Height of the catheter's tip above the plane of the neck, as a fraction of the height of the sac; 0.25 if absent
-    #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
+    #[arg(long, value_name = "FRACTION")]
     pub(crate) tip_height: Option<f64>,
     /// Folder for coil.csv, .json, .svg and .png
     #[arg(long, value_name = "DIR")]
@@ -200,7 +200,7 @@ pub(crate) struct TimingArgs {
     #[arg(long, visible_alias = "method", value_delimiter = ',', default_value = "li2011-dense,li2011-banded,kirchhoff", value_name = "METHOD,…", value_parser = all_or_method_names())]
     pub(crate) methods: Vec<String>,
     /// Longest time to bring a method into position; a method that takes longer is named in a note
-    #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 10.0, value_name = "S")]
     pub(crate) limit_s: f64,
     /// Folder for timing.csv, .json, .svg and .png
     #[arg(long, value_name = "DIR")]

@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use crate::args::VerifyArgs;
 use crate::cache::Cache;
+use crate::commands::lab::check_limit_s;
 use crate::commands::lab::parallel::in_parallel;
 use crate::failure::Failure;
 use crate::output::provenance::{Provenance, read_input};
@@ -57,6 +58,7 @@ struct Start {
 
 /// Runs the matrix, or prints the scenes of its cells.
 pub(crate) fn surfaces(args: &VerifyArgs, folder: &Path) -> Result<(), Failure> {
+    check_limit_s(args.limit_s)?;
     let files = surfaces_in(folder)?;
     let none = |pattern: &str| {
         let remedy = "no cell has all of these words; --full has more cells";

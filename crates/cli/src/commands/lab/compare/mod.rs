@@ -15,6 +15,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::args::CompareArgs;
+use crate::commands::lab::check_limit_s;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::output::{answer, progress, to_json, whole};
@@ -45,9 +46,7 @@ const MOST_ELEMENTS: usize = 1000;
 
 /// Runs missing measurements, and writes tables and picture.
 pub(crate) fn compare(args: &CompareArgs) -> Result<(), Failure> {
-    if !(args.limit_s.is_finite() && args.limit_s > 0.0) {
-        return Err(Failure::Input(format!("--limit-s {}: give a time above 0", args.limit_s)));
-    }
+    check_limit_s(args.limit_s)?;
     if let Some(elements) = args.elements.iter().find(|n| !(2..=MOST_ELEMENTS).contains(*n)) {
         return Err(Failure::Input(format!("--elements {elements}: give 2 to {MOST_ELEMENTS}")));
     }

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::lines::{Line, Lines, PAPER};
 use crate::args::TimingArgs;
+use crate::commands::lab::check_limit_s;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::output::{answer, progress};
@@ -32,9 +33,7 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
             args.repeats
         )));
     }
-    if !(args.limit_s.is_finite() && args.limit_s > 0.0) {
-        return Err(Failure::Input(format!("--limit-s {}: give a time above 0", args.limit_s)));
-    }
+    check_limit_s(args.limit_s)?;
     if args.nodes.is_empty() {
         return Err(Failure::Input("--nodes: give at least one number of nodes".to_owned()));
     }
