@@ -52,7 +52,7 @@ impl Motion {
 }
 
 /// The hand on one instrument.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Hand {
     mm_per_s: f64,
     deg_per_s: f64,

@@ -101,6 +101,11 @@ impl History {
         self.done
     }
 
+    /// Whether steps were undone and can be done again.
+    pub(crate) fn has_undone(&self) -> bool {
+        self.done < self.steps.len()
+    }
+
     /// Totals over the steps that are done.
     pub(crate) fn went(&self) -> Went {
         self.went[self.done]

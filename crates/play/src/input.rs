@@ -4,7 +4,7 @@ use endowire_viewer::{Mode, Pose};
 use serde::{Deserialize, Serialize};
 
 /// The names of all inputs, as `do` has them.
-pub const INPUTS: [&str; 18] = [
+pub const INPUTS: [&str; 20] = [
     "select",
     "move",
     "nudge",
@@ -19,6 +19,8 @@ pub const INPUTS: [&str; 18] = [
     "zoom",
     "collimate",
     "turn_camera",
+    "zoom_camera",
+    "move_camera",
     "script",
     "undo",
     "redo",
@@ -136,6 +138,20 @@ pub enum Input {
         /// Upwards, degrees.
         #[serde(default)]
         elevation_deg: f64,
+    },
+    /// Magnifies the 3D view, from half to twenty times its size.
+    ZoomCamera {
+        /// Factor of the magnification, 0.1 to 10.
+        factor: f64,
+    },
+    /// Moves the middle of the 3D view, as far as the whole is beside it.
+    MoveCamera {
+        /// To the right, in widths of the view.
+        #[serde(default)]
+        right: f64,
+        /// Upwards, in widths of the view.
+        #[serde(default)]
+        up: f64,
     },
     /// Plays the scene's script from its start, or continues it. Moving an instrument ends it; `stop` pauses it.
     Script {},

@@ -6,7 +6,9 @@ use std::collections::BTreeSet;
 use endowire_core::device::Stack;
 use endowire_viewer::Mode;
 
+use crate::lab::BLADES_IN;
 use crate::pad::Pad;
+use crate::session::IdleKey;
 use crate::{Input, USUAL_DEG_PER_S, USUAL_MM_PER_S, USUAL_STEER_PER_S};
 
 /// Keys and their effects, for display; F1 and Esc are handled by the window or page.
@@ -25,10 +27,52 @@ pub const KEYS: &[(&str, &str)] = &[
     ("drag the live picture", "move the table"),
     ("+ -, wheel", "magnify"),
     ("Q E", "blades in and out"),
-    ("drag the 3D view", "turn it"),
+    ("drag the 3D view, wheel", "turn it; with Shift or the right button: move it; magnify"),
     ("P, Shift P", "show the script, have it rest; moving takes over"),
     ("Backspace, Shift Backspace", "undo the last motion, do it again"),
 ];
+
+/// Keys of each of [`KEYS`] that may be idle, and whether they are meant with Shift.
+const CODES: [&[(&str, bool)]; KEYS.len()] = [
+    &[],
+    &[],
+    &[("KeyA", false), ("KeyS", false), ("KeyW", false)],
+    &[],
+    &[("Tab", false)],
+    &[],
+    &[("KeyB", false)],
+    &[],
+    &[],
+    &[("KeyD", false)],
+    &[("KeyJ", false), ("KeyL", false), ("KeyO", false), ("KeyK", false)],
+    &[],
+    &[("Equal", false), ("Minus", false)],
+    &[("KeyQ", false), ("KeyE", false)],
+    &[],
+    &[("KeyP", false), ("KeyP", true)],
+    &[("Backspace", false), ("Backspace", true)],
+];
+
+/// Which keys of a line of [`KEYS`] would do nothing now, and why, in words; `None` if all do something.
+pub fn idle_words(line: usize, idle: &[IdleKey]) -> Option<String> {
+    let of = |(code, shift): &(&str, bool)| idle.iter().find(|key| key.code == *code && key.shift == *shift);
+    let found: Vec<&IdleKey> = CODES.get(line)?.iter().filter_map(of).collect();
+    let named = |key: &&IdleKey| {
+        let name = match key.code {
+            "Equal" => "+",
+            "Minus" => "-",
+            code => code.strip_prefix("Key").unwrap_or(code),
+        };
+        format!("{}{name}", if key.shift { "Shift " } else { "" })
+    };
+    let groups = found.chunk_by(|a, b| a.why == b.why);
+    let words = groups.map(|keys| {
+        let names: Vec<String> = keys.iter().map(named).collect();
+        format!("{}: {}", names.join(", "), keys[0].why)
+    });
+    let words: Vec<String> = words.collect();
+    (!words.is_empty()).then(|| words.join("; "))
+}
 
 /// Modifier keys.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -193,7 +237,7 @@ impl Keys {
     }
 
     fn blades(&mut self, by: f64) -> Vec<Input> {
-        self.open = (self.open + by).clamp(0.2, 1.0);
+        self.open = (self.open + by).clamp(BLADES_IN, 1.0);
         vec![Input::Collimate { width: self.open, height: self.open }]
     }
 
@@ -284,6 +328,31 @@ mod tests {
 
     fn moved(name: &str, mm_per_s: f64, deg_per_s: f64) -> Input {
         Input::Move { instrument: Some(name.to_owned()), mm_per_s, deg_per_s }
+    }
+
+    #[test]
+    fn idle_keys_are_told_on_their_line() {
+        for ((keys, _), codes) in KEYS.iter().zip(CODES) {
+            for (code, _) in codes {
+                let name = match *code {
+                    "Equal" => "+",
+                    "Minus" => "-",
+                    code => code.strip_prefix("Key").unwrap_or(code),
+                };
+                assert!(keys.contains(name), "{code}: {keys}");
+            }
+        }
+        let idle = |code, shift, why: &str| IdleKey { code, shift, why: why.to_owned() };
+        let line = |keys: &str| KEYS.iter().position(|line| line.0.contains(keys)).unwrap();
+        let both =
+            [idle("Backspace", false, "nothing was done yet"), idle("Backspace", true, "nothing was undone")];
+        let words = idle_words(line("Backspace"), &both).unwrap();
+        assert_eq!(words, "Backspace: nothing was done yet; Shift Backspace: nothing was undone");
+        let blind = ["KeyA", "KeyS", "KeyW"].map(|code| idle(code, false, "no tip here is steered"));
+        assert_eq!(idle_words(line("A, S"), &blind).unwrap(), "A, S, W: no tip here is steered");
+        // The twin: another line, and none that is idle.
+        assert_eq!(idle_words(line("Tab"), &both), None);
+        assert_eq!(idle_words(line("Backspace"), &[]), None);
     }
 
     #[test]

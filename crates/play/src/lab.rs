@@ -12,6 +12,9 @@ use crate::meter::Delivered;
 const FILL: f64 = 0.92;
 /// Range of the magnification. Magnification modes of detectors cover fields from about 48 cm down to 11 cm.
 const MAGNIFICATION: [f64; 2] = [0.5, 8.0];
+/// The same of the 3D view, and how far its middle may go aside, in widths of the whole.
+const CAMERA: [f64; 2] = [0.5, 20.0];
+const MOST_SHIFT: f64 = 0.5;
 /// Largest angles of a C-arm, degrees: LAO and RAO, cranial and caudal.
 const MOST_LAO_DEG: f64 = 120.0;
 const MOST_CRA_DEG: f64 = 60.0;
@@ -19,6 +22,8 @@ const MOST_CRA_DEG: f64 = 60.0;
 const MOST_TABLE_MM: f64 = 10_000.0;
 /// Smallest fraction of the field that the collimator leaves open.
 const LEAST_SHARE: f64 = 0.1;
+/// The same that a key leaves open.
+pub(crate) const BLADES_IN: f64 = 0.2;
 /// Frames per second, as in interventional fluoroscopy.
 const FRAMES_PER_S: f64 = 30.0;
 /// Number of energies that represent the spectrum unless the scene gives it: accurate to 10⁻⁴, at an eighth of the
@@ -358,9 +363,7 @@ impl Lab {
     }
 
     pub(crate) fn zoom(&mut self, factor: f64) -> Result<()> {
-        if !(0.1..=10.0).contains(&factor) {
-            return Err(Error::parameter("factor", factor, "must be a number from 0.1 to 10"));
-        }
+        check_factor(factor)?;
         let magnification = (self.magnification() * factor).clamp(MAGNIFICATION[0], MAGNIFICATION[1]);
         let open = self.open;
         self.change(|spec| {
@@ -381,6 +384,23 @@ impl Lab {
         Ok(())
     }
 
+    /// Keys by which C-arm, magnification and blades go no further, and why.
+    pub(crate) fn ends(&self) -> Vec<(&'static str, &'static str)> {
+        let [lao, cra] = self.fluoro.c_arm.angles_deg();
+        let (large, open) = (self.magnification(), self.open);
+        let ends = [
+            ("KeyJ", lao <= -MOST_LAO_DEG, "the C-arm goes no further"),
+            ("KeyL", lao >= MOST_LAO_DEG, "the C-arm goes no further"),
+            ("KeyO", cra >= MOST_CRA_DEG, "the C-arm goes no further"),
+            ("KeyK", cra <= -MOST_CRA_DEG, "the C-arm goes no further"),
+            ("Equal", large >= MAGNIFICATION[1], "the field is as small as it gets"),
+            ("Minus", large <= MAGNIFICATION[0], "the field is as large as it gets"),
+            ("KeyQ", open.iter().all(|share| *share <= BLADES_IN), "the blades go no further in"),
+            ("KeyE", open == [1.0; 2], "the blades are out"),
+        ];
+        ends.into_iter().filter(|end| end.1).map(|(code, _, why)| (code, why)).collect()
+    }
+
     /// Fractions of the field that the collimator leaves open.
     pub fn open(&self) -> [f64; 2] {
         self.open
@@ -393,6 +413,38 @@ impl Lab {
         camera.azimuth_deg = Some((azimuth + 180.0).rem_euclid(360.0) - 180.0);
         camera.elevation_deg = Some((camera.elevation_deg.unwrap_or(18.0) + by_deg[1]).clamp(-89.0, 89.0));
         self.revisions[1] += 1;
+        Ok(())
+    }
+
+    pub(crate) fn zoom_camera(&mut self, factor: f64) -> Result<()> {
+        check_factor(factor)?;
+        let camera = &mut self.three_d.camera;
+        camera.magnification = (camera.magnification * factor).clamp(CAMERA[0], CAMERA[1]);
+        self.revisions[1] += 1;
+        Ok(())
+    }
+
+    /// Moves the middle of the 3D view by shares of its width as it is seen.
+    pub(crate) fn move_camera(&mut self, by: [f64; 2]) -> Result<()> {
+        within(["right", "up"], by, 10.0)?;
+        let camera = &mut self.three_d.camera;
+        for (shift, by) in camera.shift.iter_mut().zip(by) {
+            *shift = (*shift + by / camera.magnification).clamp(-MOST_SHIFT, MOST_SHIFT);
+        }
+        self.revisions[1] += 1;
+        Ok(())
+    }
+
+    /// Draws pictures of this many pixels a side. The dose is that of the same room.
+    pub(crate) fn show_at(&mut self, side_px: u32) -> Result<()> {
+        let size_px = [side_px; 2];
+        ViewSpec { size_px, ..self.fluoro.clone() }.validate()?;
+        let before = self.revisions[0];
+        (self.fluoro.size_px, self.three_d.size_px) = (size_px, size_px);
+        self.revisions.iter_mut().for_each(|revision| *revision += 1);
+        if let Some(frame) = self.last_delivered.as_mut().filter(|frame| frame.revision == before) {
+            frame.revision = self.revisions[0];
+        }
         Ok(())
     }
 
@@ -414,6 +466,13 @@ fn collimate(spec: &mut ViewSpec, open: [f64; 2]) {
     let seen_mm = spec.c_arm.field_mm.map(|field| field / spec.c_arm.magnification);
     spec.c_arm.collimation_mm =
         seen_mm.filter(|_| open != [1.0; 2]).map(|seen| open.map(|share| share * seen));
+}
+
+fn check_factor(factor: f64) -> Result<()> {
+    match (0.1..=10.0).contains(&factor) {
+        true => Ok(()),
+        false => Err(Error::parameter("factor", factor, "must be a number from 0.1 to 10")),
+    }
 }
 
 /// Refuses angles of more than a turn.

@@ -6,6 +6,7 @@
 //! ([`Session::script`]).
 
 mod demonstration;
+mod fitting;
 mod hand;
 mod history;
 mod input;
@@ -21,9 +22,10 @@ mod script;
 mod session;
 mod telemetry;
 
+pub use fitting::fitting_side;
 pub use hand::Motion;
 pub use input::{INPUTS, Input};
-pub use keys::{KEYS, Keys, Modifiers};
+pub use keys::{KEYS, Keys, Modifiers, idle_words};
 pub use lab::Lab;
 pub use lumens::lumens;
 pub use pad::{Button, PAD, Pad};
@@ -31,7 +33,7 @@ pub use pictures::{Pictures, Sharpened, Sharpening};
 pub use readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
 pub use replay::Inputs;
 pub use script::script_head;
-pub use session::{Session, Snapshot, TICK_SOLVES};
+pub use session::{IdleKey, Session, Snapshot, TICK_SOLVES};
 
 /// Ticks per second.
 pub const TICKS_PER_S: f64 = 60.0;

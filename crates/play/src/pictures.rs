@@ -8,7 +8,7 @@ use endowire_core::shape::Shape;
 use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result};
 use endowire_methods::Scene;
-use endowire_viewer::{Image, Moment, Pushed, Renderer, Seen, ViewSpec};
+use endowire_viewer::{Brightness, Image, Moment, Pushed, Renderer, Seen, ViewSpec};
 
 use crate::session::Snapshot;
 
@@ -59,6 +59,8 @@ struct Plane {
     coarse: Option<(u64, Renderer)>,
     /// Whether the sharp renderer is being updated elsewhere.
     away: bool,
+    /// State of the brightness control in the last frame, which that of the next room goes on from.
+    brightness: Option<Brightness>,
 }
 
 /// The computation of a sharp picture after a change of the room.
@@ -204,7 +206,11 @@ impl Pictures {
                     made(&mut plane.coarse, sharp, (revision, &coarse), &self.wall)?
                 }
             };
+            if let Some(state) = plane.brightness {
+                renderer.brighten(state)?;
+            }
             let image = renderer.draw(&mut self.pushed, &moment)?.fluoro;
+            plane.brightness = renderer.brightness();
             images.push(image.ok_or_else(|| Error::parameter("view.views", "fluoro", "was not drawn"))?);
         }
         self.before = Some(Before {

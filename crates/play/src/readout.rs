@@ -5,6 +5,8 @@ use endowire_core::insertion::{Packing, StepReport};
 use endowire_viewer::Mode;
 use serde::Serialize;
 
+use crate::session::IdleKey;
+
 /// Limits above which the operator is warned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
@@ -187,6 +189,8 @@ pub struct Readout {
     pub event: Option<Event>,
     /// Number of events so far.
     pub events: usize,
+    /// Keys that would do nothing now.
+    pub idle_keys: Vec<IdleKey>,
 }
 
 #[cfg(test)]

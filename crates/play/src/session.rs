@@ -1,6 +1,7 @@
 //! The session: inputs and ticks go in, readouts and snapshots come out.
 
 mod exam;
+mod idle;
 
 use endowire_assess::{Exam, Injection, Outlet};
 use endowire_core::insertion::{Command, DetachedCoil, InstrumentReport, Packing, Script, Simulation};
@@ -20,6 +21,8 @@ use crate::meter::Meter;
 use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
 use crate::replay::Inputs;
 use crate::telemetry::Telemetry;
+
+pub use idle::IdleKey;
 
 /// Largest number of events that are kept.
 const MOST_EVENTS: usize = 1000;
@@ -146,6 +149,14 @@ impl Session {
         })
     }
 
+    /// Draws pictures of this many pixels a side from now on; nothing else changes.
+    ///
+    /// # Errors
+    /// A side that is not 1 to 4096.
+    pub fn show_at(&mut self, side_px: u32) -> Result<()> {
+        self.lab.show_at(side_px)
+    }
+
     /// Adds a script, which starts from the current state and is played by [`Input::Script`].
     #[must_use]
     pub fn with_script(mut self, script: Script) -> Self {
@@ -237,6 +248,8 @@ impl Session {
             Input::TurnCamera { azimuth_deg, elevation_deg } => {
                 self.lab.turn_camera([*azimuth_deg, *elevation_deg])?;
             }
+            Input::ZoomCamera { factor } => self.lab.zoom_camera(*factor)?,
+            Input::MoveCamera { right, up } => self.lab.move_camera([*right, *up])?,
             Input::Undo {} => self.go_to(self.history.last_motion())?,
             Input::Redo {} => self.go_to(self.history.next_motion())?,
             Input::GoTo { step } => {
@@ -640,6 +653,7 @@ impl Session {
             subject: self.standing(),
             event: self.events.last().cloned(),
             events: self.events_in_all,
+            idle_keys: self.idle_keys(),
         }
     }
 

@@ -252,10 +252,12 @@ pub(crate) fn check_view(view: &Bound<'_, PyAny>) -> PyResult<()> {
 
 /// A view, overridden by a `[view]` table.
 fn overridden(spec: &ViewSpec, view: Option<&Bound<'_, PyAny>>) -> PyResult<ViewSpec> {
-    let spec = match view {
+    let vessel_moves = spec.patient.vessel_moves;
+    let mut spec = match view {
         Some(table) => document::read_over("view", spec, table)?,
         None => spec.clone(),
     };
+    spec.patient.vessel_moves = vessel_moves;
     spec.validate().map_err(exception)?;
     Ok(spec)
 }

@@ -142,7 +142,8 @@ fn noise(spec: &ViewSpec, wall: &Wall) -> Result<f64, Box<dyn Error>> {
     let mut spec = ViewSpec { bits: 16, ..spec.clone() };
     spec.xray.window = Some(WINDOW);
     spec.xray.harmonised = 0.0;
-    let still = TorsoSpec { breath_mm: 0.0, beat_mm: 0.0, ..spec.patient.torso.unwrap_or_default() };
+    let still =
+        TorsoSpec { breath_mm: Some(0.0), beat_mm: Some(0.0), ..spec.patient.torso.unwrap_or_default() };
     spec.patient.torso = Some(still);
     // Without what a frame remembers of the one before.
     spec.detector.lag = 0.0;

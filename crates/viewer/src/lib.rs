@@ -56,7 +56,7 @@ mod xray;
 pub use c_arm::CArm;
 pub use device::{DevicePart, DevicePoint, DeviceView};
 pub use device_file::{device_parts, section_parts};
-pub use fluoro::FrameTime;
+pub use fluoro::{Brightness, FrameTime};
 #[cfg(feature = "gpu")]
 pub use gpu::{Drawing, Graphics};
 pub use material::Material;

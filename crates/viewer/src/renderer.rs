@@ -13,7 +13,7 @@ use crate::c_arm::CArm;
 use crate::cpu;
 use crate::device::{DeviceView, RefinedDevice};
 use crate::engine::{Engines, PathEngine};
-use crate::fluoro::{Afterglow, Anatomy, Fluoroscope, FrameTime, Kept, Sequence, labels};
+use crate::fluoro::{Afterglow, Anatomy, Brightness, Fluoroscope, FrameTime, Kept, Sequence, labels};
 use crate::gpu;
 use crate::output::{Image, Labels};
 use crate::scene::Setup;
@@ -342,9 +342,29 @@ impl Renderer {
         })
     }
 
-    /// The exposure of fluoroscopy; `None` before its first frame.
+    /// The exposure at which fluoroscopy settles; `None` before its first frame. Labels have that of their frame.
     pub fn exposure(&self) -> Option<Exposure> {
         self.fluoro.as_ref().map(|(scope, _)| scope.exposure)
+    }
+
+    /// State of the automatic brightness control (`xray.brightness_s`), for [`Self::brighten`]; `None` before the
+    /// first frame, and where exposure is held.
+    pub fn brightness(&self) -> Option<Brightness> {
+        self.fluoro.as_ref()?.1.brightness()
+    }
+
+    /// Goes on from the brightness that another view of the same run had, or this one before it changed.
+    ///
+    /// # Errors
+    /// As [`Self::prepare`].
+    pub fn brighten(&mut self, state: Brightness) -> Result<()> {
+        if self.c_arm().is_none() {
+            return Ok(());
+        }
+        self.with_fallback(|setup, engines, fluoro, kept| {
+            prepared(setup, engines, fluoro, kept)?.1.brighten(state);
+            Ok(())
+        })
     }
 
     /// The last image hold: a weighted mean of the last frames, the newest weighing most. `None` before the first
@@ -367,10 +387,10 @@ impl Renderer {
     /// As [`Self::render_at`], and [`Error::Parameter`] without the fluoroscopic view.
     pub fn labels(&mut self, devices: &[DeviceView], contacts_mm: &[Vec3]) -> Result<Labels> {
         let of_scope = self.with_fallback(|setup, engines, fluoro, kept| {
-            let (scope, _, _) = prepared(setup, engines, fluoro, kept)?;
+            let (scope, sequence, _) = prepared(setup, engines, fluoro, kept)?;
             Ok((
                 setup.lumen.then(|| scope.vessel(setup.wall_now(), &setup.filled_now().surface)),
-                scope.exposure,
+                sequence.exposure(&scope.exposure),
             ))
         })?;
         let c_arm = self.setup.c_arm.as_ref().ok_or_else(no_fluoro)?;

@@ -1,4 +1,5 @@
 // Keyboard, buttons, mouse, touch and gamepad. What keys do is decided in the module, by the table that the program's window has too.
+import { tell } from "./screen.js";
 import { hear } from "./simulator.js";
 
 /** Keys that the browser must not use otherwise. */
@@ -44,9 +45,16 @@ export function keyboard(help) {
   });
 }
 
+/** Whether a button would do nothing now; who presses it is told why. */
+function idles(button) {
+  if (button.classList.contains("idle")) tell(button.title, true);
+  return button.classList.contains("idle");
+}
+
 export function buttons() {
   for (const button of document.querySelectorAll("[data-code]")) {
     button.addEventListener("click", () => {
+      if (idles(button)) return;
       const { code } = button.dataset;
       const shift = "shift" in button.dataset;
       if (shift) hear("modify", [true, false]);
@@ -58,7 +66,7 @@ export function buttons() {
   }
   for (const button of document.querySelectorAll("[data-hold]")) {
     const hold = (down) => {
-      if (button.classList.contains("down") === down) return;
+      if (button.classList.contains("down") === down || (down && idles(button))) return;
       button.classList.toggle("down", down);
       hear("key", [button.dataset.hold, down, false]);
     };
@@ -112,8 +120,9 @@ export function gamepad() {
   addEventListener("gamepaddisconnected", look);
 }
 
-/** Drags, pinches and wheels on a picture: `drag` by pixels of the screen, `zoom` by a factor. */
-function picture(canvas, drag, zoom) {
+/** Drags, pinches and wheels on a picture: `drag` by pixels of the screen, `zoom` by a factor, `move` by pixels with Shift, the right button
+ * or two fingers. */
+function picture(canvas, drag, zoom, move = drag) {
   const fingers = new Map();
   const apart = () => {
     const [a, b] = [...fingers.values()];
@@ -128,16 +137,22 @@ function picture(canvas, drag, zoom) {
     if (!before) return;
     const wide = fingers.size === 2 ? apart() : 0;
     fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    if (fingers.size === 2 && wide > 0) zoom?.(apart() / wide);
-    else if (fingers.size === 1) drag(event.clientX - before.x, event.clientY - before.y);
+    const [x, y] = [event.clientX - before.x, event.clientY - before.y];
+    if (fingers.size === 2) {
+      if (wide > 0) zoom(apart() / wide);
+      // Each finger has half of what both do.
+      move(x / 2, y / 2);
+    } else if (fingers.size === 1) {
+      if (event.shiftKey || event.buttons === 2) move(x, y);
+      else drag(x, y);
+    }
   });
   for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
-  if (zoom) {
-    canvas.addEventListener("wheel", (event) => {
-      event.preventDefault();
-      zoom(1.1 ** Math.max(-5, Math.min(5, -event.deltaY / 40)));
-    }, { passive: false });
-  }
+  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    zoom(1.1 ** Math.max(-5, Math.min(5, -event.deltaY / 40)));
+  }, { passive: false });
 }
 
 /** The views; `fieldMm` tells how wide the live picture is at the isocentre. */
@@ -146,8 +161,10 @@ export function views(fluoro, second, three, fieldMm) {
     const mmPerPx = fieldMm() / canvas.clientWidth;
     hear("input", { do: "table", right_mm: -x * mmPerPx, down_mm: -y * mmPerPx, second: isSecond });
   };
-  const zoom = (factor) => hear("input", { do: "zoom", factor: Math.max(0.1, Math.min(10, factor)) });
-  picture(fluoro, table(fluoro, false), zoom);
-  picture(second, table(second, true), zoom);
-  picture(three, (x, y) => hear("input", { do: "turn_camera", azimuth_deg: -x * DEG_PER_PX, elevation_deg: y * DEG_PER_PX }));
+  const zoom = (what) => (factor) => hear("input", { do: what, factor: Math.max(0.1, Math.min(10, factor)) });
+  picture(fluoro, table(fluoro, false), zoom("zoom"));
+  picture(second, table(second, true), zoom("zoom"));
+  const turn = (x, y) => hear("input", { do: "turn_camera", azimuth_deg: -x * DEG_PER_PX, elevation_deg: y * DEG_PER_PX });
+  const move = (x, y) => hear("input", { do: "move_camera", right: -x / three.clientWidth, up: y / three.clientWidth });
+  picture(three, turn, zoom("zoom_camera"), move);
 }

@@ -5,10 +5,10 @@ import * as hands from "./hands.js";
 import { SUBJECTS } from "./listed.js";
 import { SCENES } from "./scenes.js";
 import * as screen from "./screen.js";
-import { ask, hear, hide, on, shown, started } from "./simulator.js";
+import { ask, hear, hide, on, shown, shownAs, started } from "./simulator.js";
 import * as training from "./training.js";
 
-/** Pixels a side of each picture. */
+/** Pixels a side of the first pictures: later ones are as large as they are shown, if there is time. */
 const SIDE = 384;
 /** Longest link that common programs pass on, characters. */
 const LONGEST_LINK = 30000;
@@ -150,6 +150,7 @@ hands.field(element("hand"), element("knob"));
 hands.gamepad();
 hands.views(screen.fluoro, screen.second, screen.three, () => screen.readout?.lab.field_mm ?? 0);
 hands.keyboard(() => dialogs.help());
+new ResizeObserver(() => shownAs(Math.round(screen.fluoro.clientWidth * devicePixelRatio))).observe(screen.fluoro);
 addEventListener("hashchange", begin);
 document.addEventListener("visibilitychange", () => {
   if (document.hidden) hear("letGo");

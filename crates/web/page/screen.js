@@ -53,8 +53,25 @@ export function show({ readout: now, planes, three: view, backend, backend3D }) 
   element("beam").textContent = `${lab.live ? `${modes[lab.mode]} live` : "beam off"}\n${minutes(lab.beam_s)}  ${lab.entrance_ugy === null ? "" : `${(lab.entrance_ugy / 1000).toFixed(2)} mGy, ${lab.kerma_area_ugym2.toFixed(1)} µGy·m²`}`;
   element("field").textContent = `${lab.field_mm.toFixed(0)} mm`;
   element("backend").textContent = backend === backend3D ? `pictures by ${backend}` : [backend && `fluoroscopy by ${backend}`, `3D by ${backend3D}`].filter(Boolean).join(", ");
+  idle(now.idle_keys);
   hands(now);
   happened(now);
+}
+
+let idleNow = "";
+
+/** Shows which buttons would do nothing now, and why. */
+function idle(keys) {
+  const text = JSON.stringify(keys);
+  if (text === idleNow) return;
+  idleNow = text;
+  for (const button of document.querySelectorAll("[data-code], [data-hold]")) {
+    const code = button.dataset.code ?? button.dataset.hold;
+    const found = keys.find((key) => key.code === code && key.shift === ("shift" in button.dataset));
+    button.classList.toggle("idle", Boolean(found));
+    button.setAttribute("aria-disabled", Boolean(found));
+    button.title = found?.why ?? "";
+  }
 }
 
 function hands(now) {

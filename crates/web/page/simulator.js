@@ -50,5 +50,8 @@ export const shown = () => worker.postMessage({ shown: true });
 /** Has time stand still while nobody looks. */
 export const hide = (hidden) => worker.postMessage({ hidden });
 
+/** Says how large the live picture is shown, in pixels of the screen. */
+export const shownAs = (shownPx) => worker.postMessage({ shownPx });
+
 /** Has time stand still while something is read; pictures go on. */
 export const wait = (waits) => worker.postMessage({ waits });

@@ -1,5 +1,5 @@
 // The session on a clock, beside the page: physics sixty times a second, pictures when there is time for them.
-import init, { Graphics, Session, Surface, keys, missingFiles } from "./pkg/endowire.js";
+import init, { Graphics, Session, Surface, fittingSide, keys, missingFiles } from "./pkg/endowire.js";
 
 const TICK_MS = 1000 / 60;
 const FRAME_MS = 1000 / 30;
@@ -7,6 +7,8 @@ const FRAME_MS = 1000 / 30;
 const LATE_MS = 100;
 /** The 3D view is drawn each so many frames: it helps, and the live picture leads. */
 const THREE_D_EVERY = 4;
+/** How often the size of pictures is chosen anew, and from how many live frames of that size. */
+const FIT_MS = 3000, FIT_FRAMES = 20;
 
 let session, memory;
 let due = 0, frameDue = 0, frames = 0, ticks = 0, live = 0, wasLive = false;
@@ -15,6 +17,8 @@ let shown = true;
 /** When the oldest input came in that no picture shows. */
 let inputAt = null;
 let hidden = false, waits = false, stopped = false, choosing = false;
+/** Side of the pictures, how large they are shown, and the time of live frames of that side since it was chosen. */
+let side = 0, shownPx = 0, fit = { at: 0, frames: 0, ms: 0 };
 let counted = { at: performance.now(), ticks: 0, live: 0 };
 
 /** The graphics processor, where the browser has one. */
@@ -77,6 +81,19 @@ async function choose(one) {
   return draws;
 }
 
+/** Has pictures drawn as large as they are shown, if there is time. */
+function chooseSide(ms) {
+  fit.frames += 1;
+  fit.ms += ms;
+  if (fit.frames < FIT_FRAMES || performance.now() - fit.at < FIT_MS || shownPx === 0) return;
+  const fitting = fittingSide(shownPx, side, fit.ms / fit.frames);
+  fit = { at: performance.now(), frames: 0, ms: 0 };
+  if (fitting !== side) {
+    side = fitting;
+    session.showAt(side);
+  }
+}
+
 /** The 3D view, if it is time for one: that of the graphics processor is drawn meanwhile, and fetched as soon as it is there. */
 function three() {
   if (choosing || (!isQuicker && frames % THREE_D_EVERY !== 0)) return null;
@@ -100,7 +117,9 @@ function draw() {
   const readout = session.readout();
   const frame = { readout, inputAt, planes: [], three: null, backend: session.backend(), backend3D: session.backend3D() };
   const isLive = readout.lab.live;
+  const begun = performance.now();
   if (isLive || wasLive) frame.planes = session.fluoroSoon();
+  if (isLive && frame.planes[0]?.width === side) chooseSide(performance.now() - begun);
   if (isLive) live += 1;
   wasLive = isLive;
   if (isQuicker && frame.backend3D !== graphics.name) isQuicker = false;
@@ -141,8 +160,10 @@ turn();
 
 /** What the page asks for; each answer goes back under its name. */
 const asked = {
-  async open({ files, path, side }) {
-    const made = new Session(files, path, side);
+  async open({ files, path, side: asked }) {
+    const made = new Session(files, path, asked);
+    side = asked;
+    fit = { at: performance.now(), frames: 0, ms: 0 };
     session?.free();
     session = made;
     if (isQuicker) {
@@ -199,6 +220,8 @@ onmessage = async ({ data }) => {
     hidden = data.hidden;
     due = frameDue = performance.now();
     shown = true;
+  } else if (data.shownPx !== undefined) {
+    shownPx = data.shownPx;
   } else if (data.waits !== undefined) {
     waits = data.waits;
   } else if (data.ask) {

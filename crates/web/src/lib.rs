@@ -72,6 +72,13 @@ pub fn missing_files(
     Ok(missing.iter().map(|path| JsValue::from(path.display().to_string())).collect())
 }
 
+/// The side in pixels for pictures that are shown `shown` pixels a side, if one of `side` takes `frame_ms` milliseconds:
+/// as large as shown, or as 30 a second can be drawn of.
+#[wasm_bindgen(js_name = fittingSide)]
+pub fn fitting_side(shown: u32, side: u32, frame_ms: f64) -> u32 {
+    endowire_play::fitting_side(shown, side, frame_ms)
+}
+
 /// Keys and gamepad controls of a session with their effects, for display.
 ///
 /// # Errors

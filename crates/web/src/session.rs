@@ -104,6 +104,15 @@ impl Session {
         self.played.take(&inputs);
     }
 
+    /// Draws pictures of `side` pixels a side from now on.
+    ///
+    /// # Errors
+    /// A side that is not 1 to 4096.
+    #[wasm_bindgen(js_name = showAt)]
+    pub fn show_at(&mut self, side: u32) -> Result<(), JsError> {
+        self.played.session.show_at(side).map_err(thrown)
+    }
+
     /// Advances by 1/60 s.
     pub fn tick(&mut self) {
         self.played.tick();

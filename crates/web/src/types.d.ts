@@ -16,6 +16,7 @@ export type Input =
   | { do: "zoom"; factor: number }
   | { do: "collimate"; width: number; height: number }
   | { do: "turn_camera"; azimuth_deg?: number; elevation_deg?: number }
+  | { do: "zoom_camera"; factor: number } | { do: "move_camera"; right?: number; up?: number }
   | { do: "go_to"; step: number };
 
 /** The readout for the operator. */
@@ -42,6 +43,8 @@ export interface Readout {
     used: { what: string; value: number; limit: number; unit: string }[]; verdict: Verdict | null;
   };
   event: { step: number; time_s: number; kind: string; text: string } | null; events: number;
+  /** Keys that would do nothing now, by their `code`, and why. */
+  idle_keys: { code: string; shift: boolean; why: string }[];
 }
 
 /** The task of a training subject in words, and the thresholds of its measures. */

@@ -23,7 +23,7 @@ const MIDDLE: (&str, &str) = ("c_arm.isocentre_mm", "[0.0, 0.0, 15.0]");
 const CHEST: (&str, &str) = ("c_arm.field_mm", "500.0");
 
 /// All keys. Pictures of all backends are the same; one that there is not is refused, and so is a file that is missing.
-static KEYS: [Key; 85] = [
+static KEYS: [Key; 88] = [
     ("size_px", &[], "[40, 30]"),
     ("views", &[], "[\"fluoro\"]"),
     ("every", &[], "3"),
@@ -47,6 +47,7 @@ static KEYS: [Key; 85] = [
     ("xray.mode", &[NOISE], "\"cine\""),
     ("xray.kvp", &[], "60.0"),
     ("xray.pulse_ms", &[], "30.0"),
+    ("xray.brightness_s", &[FINE], "0.0"),
     ("xray.aluminium_mm", &[], "15.0"),
     ("xray.copper_mm", &[], "3.0"),
     ("xray.energy_bins", &[FINE], "1"),
@@ -104,6 +105,8 @@ static KEYS: [Key; 85] = [
     ("camera.orbit_deg", &[("camera.turn_deg", "30.0")], "90.0"),
     ("camera.scale_bar", &[], "false"),
     ("camera.markers", &[], "false"),
+    ("camera.magnification", &[], "2.0"),
+    ("camera.shift", &[], "[0.1, 0.0]"),
     ("camera.c_arm", &[], "true"),
     ("camera.force_n", &[("size_px", "[320, 320]")], "0.5"),
     ("patient.ct.file", &[], "\"MISSING.nii\""),
@@ -299,6 +302,7 @@ fn the_list_of_keys_is_that_of_the_view() {
         patient: PatientSpec {
             torso: Some(TorsoSpec::default()),
             ct: Some(CtSpec { file: PathBuf::new(), offset_mm: [0.0; 3] }),
+            vessel_moves: false,
         },
         injection: vec![InjectionSpec {
             start_s: 0.0,

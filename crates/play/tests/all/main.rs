@@ -4,6 +4,7 @@
 
 mod demonstration;
 mod detach;
+mod idle;
 mod session;
 mod steering;
 mod trainees;

@@ -84,16 +84,39 @@ impl DeviceCells {
             let Self { view, width, places, pixels, maps } = self;
             // Not a variable, by which a closure would divide.
             const ACROSS_PX: usize = ACROSS as usize;
-            cast(view, &piece, &mut lengths, |[x, y], length| {
-                let pixel = y / ACROSS_PX * *width + x / ACROSS_PX;
-                if places[pixel] == 0 {
-                    pixels.push(pixel as u32);
-                    places[pixel] = pixels.len() as u32;
-                    maps.iter_mut().for_each(|map| map.1.push([0.0; CELLS]));
-                }
-                let (place, cell) = (places[pixel] as usize - 1, y % ACROSS_PX * ACROSS_PX + x % ACROSS_PX);
-                for (of_material, sign) in &parts {
-                    maps[*of_material].1[place][cell] += (sign * length) as f32;
+            cast(view, &piece, &mut lengths, |first, along, lengths| {
+                // Pixel by pixel of the line.
+                let (mut done, mut of_run) = (0, [0.0; ACROSS_PX]);
+                while done < lengths.len() {
+                    let mut at = first;
+                    at[along] += done;
+                    let of_pixel = ACROSS_PX - at[along] % ACROSS_PX;
+                    let lengths = &lengths[done..lengths.len().min(done + of_pixel)];
+                    done += lengths.len();
+                    if lengths.iter().all(|length| *length <= 0.0) {
+                        continue;
+                    }
+                    let [x, y] = at;
+                    let pixel = y / ACROSS_PX * *width + x / ACROSS_PX;
+                    if places[pixel] == 0 {
+                        pixels.push(pixel as u32);
+                        places[pixel] = pixels.len() as u32;
+                        maps.iter_mut().for_each(|map| map.1.push([0.0; CELLS]));
+                    }
+                    let cell = y % ACROSS_PX * ACROSS_PX + x % ACROSS_PX;
+                    of_run.iter_mut().zip(lengths).for_each(|(of, length)| *of = *length as f32);
+                    for (of_material, sign) in &parts {
+                        let cells = &mut maps[*of_material].1[places[pixel] as usize - 1][cell..];
+                        let more = of_run[..lengths.len()].iter().map(|length| *sign as f32 * length);
+                        match along {
+                            0 => cells.iter_mut().zip(more).for_each(|(cell, more)| *cell += more),
+                            _ => cells
+                                .iter_mut()
+                                .step_by(ACROSS_PX)
+                                .zip(more)
+                                .for_each(|(cell, more)| *cell += more),
+                        }
+                    }
                 }
             });
         }
@@ -162,9 +185,14 @@ pub(crate) fn quarter(cell: usize) -> usize {
     cell / across / half * 2 + cell % across / half
 }
 
-/// Calls `visit(cell, length_mm)` for every cell of `view` in which `piece` is visible, possibly with several parts
-/// of its length; `lengths` is room for those of a line.
-fn cast(view: &CArm, piece: &Piece, lengths: &mut Vec<f64>, mut visit: impl FnMut([usize; 2], f64)) {
+/// Calls `visit(cell, along, lengths_mm)` for every run of cells of `view` in which `piece` is visible, possibly with
+/// several parts of their lengths: from a cell on along rows (0) or columns (1). `lengths` is room for those of a line.
+fn cast(
+    view: &CArm,
+    piece: &Piece,
+    lengths: &mut Vec<f64>,
+    mut visit: impl FnMut([usize; 2], usize, &[f64]),
+) {
     let size = view.size_px();
     let band = Band::new(view, piece);
     if let Some(end_on) = EndOn::new(view, piece, &band) {
@@ -201,11 +229,7 @@ fn cast(view: &CArm, piece: &Piece, lengths: &mut Vec<f64>, mut visit: impl FnMu
         } else {
             lengths.extend(cells.clone().map(|cell| length(view, piece, place(cell as f64 + 0.5))));
         }
-        for (cell, &length) in cells.zip(lengths.iter()) {
-            if length > 0.0 {
-                visit(if band.u == 0 { [cell, line] } else { [line, cell] }, length);
-            }
-        }
+        visit(if band.u == 0 { [cells.start, line] } else { [line, cells.start] }, band.u, lengths);
     }
 }
 
@@ -242,7 +266,13 @@ impl EndOn {
     }
 
     /// As [`cast`], with the lengths of rays that are denser than the cells, scaled to the right sum.
-    fn cast(&self, view: &CArm, piece: &Piece, band: &Band, mut visit: impl FnMut([usize; 2], f64)) {
+    fn cast(
+        &self,
+        view: &CArm,
+        piece: &Piece,
+        band: &Band,
+        mut visit: impl FnMut([usize; 2], usize, &[f64]),
+    ) {
         let size = view.size_px().map(f64::from);
         let [low, high] = band.lines();
         let (share, fewest) = RAYS_END_ON;
@@ -267,7 +297,7 @@ impl EndOn {
         let each = self.sum_mm / met.iter().map(|ray| ray.1).sum::<f64>();
         let seen = |at: &[f64; 2]| (0..2).all(|k| (0.0..size[k]).contains(&at[k]));
         for (at, length) in met.into_iter().filter(|(at, _)| seen(at)) {
-            visit(at.map(|x| x as usize), each * length);
+            visit(at.map(|x| x as usize), 0, &[each * length]);
         }
     }
 }

@@ -21,6 +21,8 @@ pub(crate) struct Anatomy {
     pub(crate) body: Vec<f32>,
     pub(crate) bone: Vec<f32>,
     pub(crate) lung: Vec<f32>,
+    /// Lung on the rays through the middles of pixels.
+    pub(super) lung_of_pixels: Vec<f32>,
     pub(crate) lumen: Vec<f32>,
     /// The part of the lumen, beyond ends of vessels, in which medium that is everywhere is not seen.
     pub(crate) faded: Vec<f32>,
@@ -50,7 +52,7 @@ impl Anatomy {
                 bone.iter_mut().zip(marrow).for_each(|(b, m)| *b = (*b - Body::NOT_BONE as f32 * m).max(0.0));
                 body.texture.apply(Of::Bone, &mut bone, c_arm);
                 maps.bone = finer(bone);
-                maps.lung = air(setup, c_arm, rays, engine)?;
+                maps.breathe(air(setup, c_arm, engine)?, c_arm, rays);
             }
             Patient::Tomogram(volume) => {
                 [maps.body, maps.bone] = volume.project(view);
@@ -75,7 +77,7 @@ impl Anatomy {
         if setup.lumen {
             (moved.lumen, moved.faded) = filled(setup, &c_arm.refined(rays), engine)?;
         }
-        moved.lung = air(setup, c_arm, rays, engine)?;
+        moved.breathe(air(setup, c_arm, engine)?, c_arm, rays);
         if let Patient::Tomogram(volume) = &*setup.patient {
             let view = &c_arm.refined(rays);
             moved.body = match setup.displacement() {
@@ -87,6 +89,12 @@ impl Anatomy {
             };
         }
         Ok(moved)
+    }
+
+    /// Sets the air, from that on the rays through the middles of pixels.
+    fn breathe(&mut self, air: Vec<f32>, c_arm: &CArm, rays: u32) {
+        self.lung = finer(air.clone(), c_arm.size_px(), rays);
+        self.lung_of_pixels = air;
     }
 
     /// Whether a ray meets the body.
@@ -156,26 +164,45 @@ fn filled(setup: &Setup, view: &CArm, engine: &mut dyn PathEngine) -> Result<(Ve
     Ok((lumen, faded))
 }
 
-/// Lengths in the air of a generated body, at its displacement.
-fn air(setup: &Setup, c_arm: &CArm, rays: u32, engine: &mut dyn PathEngine) -> Result<Vec<f32>> {
-    let Some(mesh) = setup.air_now() else { return Ok(vec![]) };
-    Ok(finer(air_of(setup, mesh, c_arm, engine)?, c_arm.size_px(), rays))
+/// Lengths of the rays through the middles of pixels in the air of a generated body, at its displacement.
+fn air(setup: &Setup, c_arm: &CArm, engine: &mut dyn PathEngine) -> Result<Vec<f32>> {
+    setup.air_now().map_or(Ok(vec![]), |mesh| air_of(setup, mesh, c_arm, engine, &mut vec![]))
 }
 
-/// Lengths of the central rays of pixels in the air of a generated body with this surface.
+/// Lengths of the central rays of pixels in the air of a generated body with this surface, and the noise that they have
+/// met.
 pub(super) fn air_of(
     setup: &Setup,
     mesh: &SurfaceMesh,
     c_arm: &CArm,
     engine: &mut dyn PathEngine,
+    met: &mut Vec<f64>,
 ) -> Result<Vec<f32>> {
     let mut air = cast(mesh, c_arm, engine)?;
     // Vessels of a lung overlap where they divide.
     air.iter_mut().for_each(|length| *length = length.max(0.0));
     if let Patient::Torso(body) = &*setup.patient {
-        body.texture.apply(Of::Lung, &mut air, c_arm);
+        body.texture.apply_again(Of::Lung, &mut air, c_arm, met);
     }
     Ok(air)
+}
+
+/// The pixels before and after a ray along a row or column, and the weight of the second.
+#[inline]
+fn beside(ray: usize, rays: usize, pixels: usize) -> (usize, usize, f32) {
+    let at = ((ray as f32 + 0.5) / rays as f32 - 0.5).clamp(0.0, (pixels - 1) as f32);
+    let first = at as usize;
+    (first, (first + 1).min(pixels - 1), at - first as f32)
+}
+
+/// One value of [`finer`], of a map that is not empty.
+#[inline]
+pub(super) fn finer_at(map: &[f32], size_px: [u32; 2], rays: usize, ray: usize) -> f32 {
+    let [width, height] = size_px.map(|n| n as usize);
+    let (i, j, u) = beside(ray % (rays * width), rays, width);
+    let (above, below, v) = beside(ray / (rays * width), rays, height);
+    let mix = |row: usize| map[row * width + i] * (1.0 - u) + map[row * width + j] * u;
+    mix(above) * (1.0 - v) + mix(below) * v
 }
 
 /// A map with `rays` × `rays` values per pixel, bilinear between pixel centres.
@@ -185,17 +212,11 @@ pub(super) fn finer(map: Vec<f32>, size_px: [u32; 2], rays: u32) -> Vec<f32> {
     }
     let [width, height] = size_px.map(|n| n as usize);
     let rays = rays as usize;
-    // The pixels before and after a ray, and the weight of the second.
-    let place = |ray: usize, pixels: usize| {
-        let at = ((ray as f32 + 0.5) / rays as f32 - 0.5).clamp(0.0, (pixels - 1) as f32);
-        let first = at as usize;
-        (first, (first + 1).min(pixels - 1), at - first as f32)
-    };
-    let columns: Vec<_> = (0..rays * width).map(|ray| place(ray, width)).collect();
+    let columns: Vec<_> = (0..rays * width).map(|ray| beside(ray, rays, width)).collect();
     let mut finer = vec![0.0; map.len() * rays * rays];
     let rows = finer.par_chunks_exact_mut(rays * width).with_min_len(FEWEST_ROWS).enumerate();
     rows.for_each(|(ray, row)| {
-        let (above, below, v) = place(ray, height);
+        let (above, below, v) = beside(ray, rays, height);
         let (above, below) = (&map[above * width..][..width], &map[below * width..][..width]);
         for (value, &(i, j, u)) in row.iter_mut().zip(&columns) {
             let mix = |line: &[f32]| line[i] * (1.0 - u) + line[j] * u;
@@ -220,6 +241,7 @@ mod tests {
                 assert!((twice[row * 16 + column] - at).abs() < 1e-5, "{row} {column}");
             }
         }
+        assert!((0..twice.len()).all(|ray| finer_at(&map, [8, 6], 2, ray) == twice[ray]));
         assert_eq!(finer(map.clone(), [8, 6], 1), map);
     }
 }

@@ -15,6 +15,7 @@
 //! pixel, and over many more at devices ([`DeviceCells`]).
 
 mod anatomy;
+mod brightness;
 mod display;
 mod labels;
 mod moving;
@@ -29,6 +30,7 @@ use endowire_core::{Error, Result, Vec3};
 use rayon::prelude::*;
 
 pub(crate) use anatomy::Anatomy;
+pub use brightness::Brightness;
 pub(crate) use labels::labels;
 use moving::Moving;
 use rays::Room;

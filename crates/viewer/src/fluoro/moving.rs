@@ -1,19 +1,22 @@
 //! A body that breathes and whose heart beats, at the cost of a still one.
 //!
-//! Pictures of the body are made at a few parts of a breath and of a beat, each when it is first needed. Between them
-//! lengths of air L and the logarithms of primary signals are linear, which agree, since a signal is nearly the
-//! exponential of a length:
+//! Pictures of the body are made at a few parts of a breath, each with a few parts of a beat, when they are first needed.
+//! Between them lengths of air L and the logarithms of primary signals are linear in both parts, which agree, since a
+//! signal is nearly the exponential of a length:
 //!
 //! ```text
 //! L = L₀ + Σ wₖ (Lₖ − L₀),    ln S = ln S₀ + Σ wₖ (ln Sₖ − ln S₀)
 //! ```
 //!
-//! Breath and beat are added. Scatter, exposure and window stay those of the body at rest.
+//! Each picture has both motions: the differences of a beat lie where the breath has moved the heart's border to, and
+//! added to those of another part of the breath they are lines beside it. Scatter, exposure and window stay those of the
+//! body at rest.
 
 use endowire_core::Result;
 use rayon::prelude::*;
 
-use super::anatomy::{air_of, finer};
+use super::anatomy::{air_of, finer_at};
+use super::rays::Room;
 use super::{FEWEST_PIXELS, Fluoroscope, SUBRAYS, Signal};
 use crate::engine::PathEngine;
 use crate::patient::{Patient, Rhythm};
@@ -21,46 +24,51 @@ use crate::scene::Setup;
 use crate::spec::Mode;
 use crate::xray::{LANES, exp_lanes, ln_lanes};
 
-/// Numbers of pictures of a breath and of a beat, besides that at rest: two and one millimetre apart as a rule. Half as
-/// many show borders twice.
-const PICTURES: [usize; 2] = [6, 4];
+/// Numbers of parts of a breath and of a beat, besides rest: two millimetres apart as a rule. Half as many show borders
+/// twice.
+const PARTS: [usize; 2] = [6, 2];
+/// Number of pictures with rest, which is the first.
+const PICTURES: usize = (PARTS[0] + 1) * (PARTS[1] + 1);
 
 /// The pictures of a body that moves.
 #[derive(Debug)]
 pub(super) struct Moving {
     rhythm: Rhythm,
+    size_px: [u32; 2],
     /// Logarithms of primary signal and energy at rest.
     rest: [Vec<f32>; 2],
-    pictures: [[Option<Picture>; PICTURES[0]]; 2],
-    /// Which pictures make up the current moment: of breath (0) or beat (1), number, weight.
-    now: Vec<(usize, usize, f32)>,
-    /// Their signal, if it differs from that at rest.
+    pictures: [Option<Picture>; PICTURES],
+    /// Noise of the lungs' texture that rays have met.
+    noise: Vec<f64>,
+    /// What the current moment has more than rest: air on the rays through the middles of pixels; empty at rest.
+    air: Vec<f32>,
+    /// Its signal, if it differs from that at rest.
     signal: Option<Signal>,
 }
 
-/// A picture of a body that has moved.
+/// A picture of a body that has moved: differences from rest.
 #[derive(Debug)]
 struct Picture {
-    /// Lengths of air on the rays through the middles of pixels.
-    central: Vec<f32>,
-    /// Differences from rest: of lengths of air on all rays, and of logarithms of primary signal and energy.
+    /// Of lengths of air on the rays through the middles of pixels.
     air: Vec<f32>,
+    /// Of logarithms of primary signal and energy.
     ln: [Vec<f32>; 2],
 }
 
 impl Moving {
-    /// `None` for a body that does not move, and in subtractions, for which the breath is held.
+    /// `None` for a body that does not move, or only with its vessel, and in subtractions, for which the breath is held.
     pub(super) fn new(setup: &Setup) -> Result<Option<Self>> {
         let shown = matches!(setup.spec.xray.mode, Mode::Fluoro | Mode::Cine);
-        let Some(torso) = setup.spec.patient.torso.as_ref().filter(|torso| shown && torso.lungs) else {
-            return Ok(None);
-        };
-        let rhythm = Rhythm::new(torso, &setup.spec.flow)?;
+        let (patient, size_px) = (&setup.spec.patient, setup.c_arm.as_ref().map(crate::CArm::size_px));
+        let torso = patient.torso.as_ref().filter(|torso| shown && torso.lungs && !patient.vessel_moves);
+        let (Some(torso), Some(size_px)) = (torso, size_px) else { return Ok(None) };
         Ok(Some(Self {
-            rhythm,
+            rhythm: Rhythm::new(torso, &setup.spec.flow)?,
+            size_px,
             rest: Default::default(),
-            pictures: Default::default(),
-            now: vec![],
+            pictures: [const { None }; PICTURES],
+            noise: vec![],
+            air: vec![],
             signal: None,
         }))
     }
@@ -78,11 +86,7 @@ impl Moving {
     /// Length of air on a ray beyond that at rest.
     #[inline]
     pub(super) fn more_air(&self, ray: usize) -> f32 {
-        self.now.iter().map(|&(of, k, weight)| weight * self.at(of, k).map_or(0.0, |p| p.air[ray])).sum()
-    }
-
-    fn at(&self, of: usize, number: usize) -> Option<&Picture> {
-        self.pictures[of][number].as_ref()
+        if self.air.is_empty() { 0.0 } else { finer_at(&self.air, self.size_px, SUBRAYS as usize, ray) }
     }
 }
 
@@ -94,19 +98,21 @@ fn logarithms(primaries: &[[f32; 2]]) -> [Vec<f32>; 2] {
     })
 }
 
-/// The pictures that a part of a breath or beat lies between, with their weights; that at rest counts as none.
-fn between(part: f64, pictures: usize) -> impl Iterator<Item = (usize, f32)> {
-    let place = part.clamp(0.0, 1.0) * pictures as f64;
-    let low = place.floor();
-    let share = (place - low) as f32;
-    let low = low as usize;
-    let both = [(low.checked_sub(1), 1.0 - share), (Some(low), share)];
-    both.into_iter().filter_map(|(k, weight)| Some((k?, weight))).filter(|(_, weight)| *weight > 0.0)
+/// The pictures that parts of a breath and of a beat lie between, with their weights; that at rest, 0, is left out.
+fn between(parts: [f64; 2]) -> Vec<(usize, f32)> {
+    let [breath, beat] = [0, 1].map(|of| {
+        let place = parts[of].clamp(0.0, 1.0) * PARTS[of] as f64;
+        let low = place.floor();
+        let share = (place - low) as f32;
+        [(low as usize, 1.0 - share), (low as usize + 1, share)]
+    });
+    let all = breath.into_iter().flat_map(|(k, a)| beat.map(|(j, b)| (k * (PARTS[1] + 1) + j, a * b)));
+    all.filter(|&(number, weight)| number > 0 && weight > 0.0).collect()
 }
 
 impl Fluoroscope {
-    /// Brings the body to its place at a time; without one, and where the vessel moves by its own field, which takes the
-    /// body along, to rest.
+    /// Brings the body to its place at a time; without one, and where the vessel is displaced, which takes the body
+    /// along, to rest.
     pub(crate) fn breathe(
         &mut self,
         setup: &Setup,
@@ -114,66 +120,71 @@ impl Fluoroscope {
         engine: &mut dyn PathEngine,
     ) -> Result<()> {
         let Some(moving) = &mut self.moving else { return Ok(()) };
-        (moving.now, moving.signal) = (vec![], None);
+        (moving.air, moving.signal) = (vec![], None);
         let Some(time_s) = time_s.filter(|_| setup.displacement().is_none()) else { return Ok(()) };
-        let parts = moving.rhythm.parts(time_s);
-        let now: Vec<_> = (0..2)
-            .flat_map(|of| between(parts[of], PICTURES[of]).map(move |(k, weight)| (of, k, weight)))
-            .collect();
-        for &(of, number, _) in &now {
-            self.take_picture(setup, of, number, engine)?;
+        let now = between(moving.rhythm.parts(time_s));
+        for &(number, _) in &now {
+            self.take_picture(setup, number, engine)?;
         }
-        if let Some(moving) = self.moving.as_mut().filter(|_| !now.is_empty()) {
-            moving.now = now;
-            self.mix();
+        if !now.is_empty() {
+            self.mix(&now);
         }
         Ok(())
     }
 
-    /// The picture of a part of a breath or beat, unless it is known.
-    fn take_picture(
-        &mut self,
-        setup: &Setup,
-        of: usize,
-        number: usize,
-        engine: &mut dyn PathEngine,
-    ) -> Result<()> {
-        let Some(moving) = &self.moving else { return Ok(()) };
+    /// The picture of parts of a breath and beat, unless it is known.
+    fn take_picture(&mut self, setup: &Setup, number: usize, engine: &mut dyn PathEngine) -> Result<()> {
+        let Some(moving) = &mut self.moving else { return Ok(()) };
         let Patient::Torso(body) = &*setup.patient else { return Ok(()) };
-        if moving.at(of, number).is_some() {
+        if moving.pictures[number].is_some() {
             return Ok(());
         }
-        let mut parts = [0.0; 2];
-        parts[of] = (number + 1) as f64 / PICTURES[of] as f64;
-        let central = air_of(setup, &body.motion.moved(&body.lungs, parts), &self.c_arm, engine)?;
-        let mut air = finer(central.clone(), self.c_arm.size_px(), SUBRAYS);
-        air.iter_mut().zip(&self.anatomy.lung).for_each(|(air, rest)| *air -= rest);
-        if let Some(moving) = &mut self.moving {
-            moving.pictures[of][number] = Some(Picture { central, air, ln: Default::default() });
-            moving.now = vec![(of, number, 1.0)];
-        }
-        let mut ln = logarithms(&self.primaries());
-        if let Some(moving) = &mut self.moving {
-            for (ln, rest) in ln.iter_mut().zip(&moving.rest) {
-                ln.iter_mut().zip(rest).for_each(|(ln, rest)| *ln -= rest);
-            }
-            if let Some(picture) = &mut moving.pictures[of][number] {
-                picture.ln = ln;
-            }
-            moving.now = vec![];
-        }
+        let places = [number / (PARTS[1] + 1), number % (PARTS[1] + 1)];
+        let parts = [0, 1].map(|of| places[of] as f64 / PARTS[of] as f64);
+        let moved = body.motion.moved(&body.lungs, parts);
+        let mut air = air_of(setup, &moved, &self.c_arm, engine, &mut moving.noise)?;
+        air.iter_mut().zip(&self.anatomy.lung_of_pixels).for_each(|(air, rest)| *air -= rest);
+        moving.air = air;
+        let ln = self.changes();
+        let Some(moving) = &mut self.moving else { return Ok(()) };
+        moving.pictures[number] = Some(Picture { air: std::mem::take(&mut moving.air), ln });
         Ok(())
     }
 
-    /// The signal of the current moment from its pictures.
-    fn mix(&mut self) {
+    /// By how much the logarithms of signal and energy of all pixels differ from rest: not where there is as much air.
+    fn changes(&self) -> [Vec<f32>; 2] {
+        let Some(moving) = &self.moving else { return Default::default() };
+        let changed = |pixel: usize| {
+            let (first, stride) = self.first_ray(pixel);
+            let rays = [first, first + 1, first + stride, first + stride + 1];
+            rays.into_iter().any(|ray| moving.more_air(ray) != 0.0)
+        };
+        let pixels: Vec<usize> = (0..moving.rest[0].len()).filter(|&pixel| changed(pixel)).collect();
+        let drawn = pixels.par_iter().with_min_len(FEWEST_PIXELS);
+        let drawn: Vec<[f32; 2]> = drawn
+            .map_init(Room::default, |room, &pixel| self.primary(pixel, [self.fraction, 0.0], room))
+            .collect();
+        let ln = logarithms(&drawn);
+        [0, 1].map(|i| {
+            let mut all = vec![0.0; moving.rest[i].len()];
+            pixels.iter().zip(&ln[i]).for_each(|(&pixel, ln)| all[pixel] = ln - moving.rest[i][pixel]);
+            all
+        })
+    }
+
+    /// Air and signal of the current moment from its pictures.
+    fn mix(&mut self, now: &[(usize, f32)]) {
         let Some(moving) = &self.moving else { return };
+        let known = || now.iter().filter_map(|&(k, weight)| Some((moving.pictures[k].as_ref()?, weight)));
+        let mut air = vec![0.0; moving.rest[0].len()];
+        for (picture, weight) in known() {
+            air.iter_mut().zip(&picture.air).for_each(|(air, more)| *air += weight * more);
+        }
         let mixed = |i: usize| {
             let mut values = moving.rest[i].clone();
             values.par_chunks_mut(FEWEST_PIXELS).enumerate().for_each(|(chunk, values)| {
                 let first = chunk * FEWEST_PIXELS;
-                for &(of, k, weight) in &moving.now {
-                    let Some(picture) = moving.at(of, k) else { continue };
+                for (picture, weight) in known() {
                     let more = &picture.ln[i][first..];
                     values.iter_mut().zip(more).for_each(|(value, more)| *value += weight * more);
                 }
@@ -190,22 +201,14 @@ impl Fluoroscope {
         };
         let signal = Signal { signal: mixed(0), energy: mixed(1) };
         if let Some(moving) = &mut self.moving {
-            moving.signal = Some(signal);
+            (moving.air, moving.signal) = (air, Some(signal));
         }
     }
 
     /// Adds what the current moment has more than rest to lengths of air at rest on the rays through the middles of pixels.
     pub(crate) fn add_air(&self, lengths: &mut [f32]) {
         let Some(moving) = &self.moving else { return };
-        let rest = lengths.to_vec();
-        for &(of, k, weight) in &moving.now {
-            let Some(picture) = moving.at(of, k) else { continue };
-            let moved = picture.central.iter().zip(&rest);
-            lengths
-                .iter_mut()
-                .zip(moved)
-                .for_each(|(length, (moved, rest))| *length += weight * (moved - rest));
-        }
+        lengths.iter_mut().zip(&moving.air).for_each(|(length, more)| *length += more);
     }
 }
 
@@ -214,11 +217,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_part_lies_between_two_pictures_and_rest_is_none() {
-        let of = |part: f64| between(part, 4).collect::<Vec<_>>();
-        assert_eq!(of(0.0), []);
-        assert_eq!(of(0.125), [(0, 0.5)]);
-        assert_eq!(of(0.625), [(1, 0.5), (2, 0.5)]);
-        assert_eq!(of(1.0), [(3, 1.0)]);
+    fn a_moment_lies_between_pictures_of_both_motions_and_rest_is_none() {
+        assert_eq!(between([0.0; 2]), []);
+        assert_eq!(between([1.0 / 12.0, 0.0]), [(3, 0.5)]);
+        assert_eq!(between([0.0, 0.75]), [(1, 0.5), (2, 0.5)]);
+        assert_eq!(between([1.0, 1.0]), [(PICTURES - 1, 1.0)]);
+        // Beside the four of both, none of one motion alone.
+        let both = between([0.25, 0.25]);
+        assert_eq!(both, [(3, 0.25), (4, 0.25), (6, 0.25), (7, 0.25)]);
     }
 }

@@ -6,25 +6,54 @@ use crate::xray::{LANES, Lanes};
 
 /// Difference of line integrals of a pixel's rays below which lengths are averaged before the spectrum.
 const ALIKE: f32 = 3e-2;
-/// The same for cells: half of them are within an eighth, so the neglected variance is below 10⁻⁴.
-const ALIKE_CELLS: f32 = 0.25;
+/// The same for cells, whose variance counts: for evenly spread ones, the neglected term is 0.5⁴/1920, below 10⁻⁴.
+const ALIKE_CELLS: f32 = 0.5;
 
 /// Work buffers.
 #[derive(Debug, Default)]
 pub(super) struct Room {
     lanes: Lanes,
     alike: Vec<Alike>,
+    known: Known,
 }
 
 /// Cells of a pixel with similar line integrals inside devices.
 #[derive(Debug, Default)]
 struct Alike {
-    step: i32,
+    /// The first of them.
+    first: f32,
     count: f32,
     /// Sums of line integrals and their squares.
     integrals: [f32; 2],
     /// Sums of lengths, by material.
     lengths: Vec<f32>,
+}
+
+/// No group.
+const NONE: u8 = u8::MAX;
+
+/// The groups of a pixel's cells, by their line integrals.
+#[derive(Debug)]
+struct Known([u8; KNOWN]);
+
+/// Number of steps of line integrals that are told apart, and of those above zero: beyond them nothing is let through.
+const KNOWN: usize = 160;
+const ABOVE_ZERO: f32 = 40.0;
+
+impl Default for Known {
+    fn default() -> Self {
+        Self([NONE; KNOWN])
+    }
+}
+
+impl Known {
+    /// The place of the group for a line integral.
+    #[inline]
+    fn of(&mut self, integral: f32) -> &mut u8 {
+        // Cells without a device are not together with those in which there is some.
+        let step = ABOVE_ZERO - integral / ALIKE_CELLS;
+        &mut self.0[step.clamp(0.0, (KNOWN - 1) as f32) as usize]
+    }
 }
 
 impl Fluoroscope {
@@ -82,33 +111,35 @@ impl Fluoroscope {
         let maps = self.devices.maps();
         // Attenuation that a device displaces.
         let filling = self.mu[3] + fraction * self.mu[4];
+        let mut integrals = [0.0; CELLS];
+        for ((_, cells), of) in maps.iter().zip(&self.device_lanes) {
+            let more = of.2 - filling;
+            integrals.iter_mut().zip(&cells[place]).for_each(|(p, length)| *p += more * length);
+        }
         let mut used = 0;
         for cell in cells {
-            let lengths = || maps.iter().map(|map| map.1[place][cell]);
-            let p: f32 =
-                lengths().zip(&self.device_lanes).map(|(length, of)| (of.2 - filling) * length).sum();
-            let step = (p / ALIKE_CELLS).ceil() as i32;
-            let group = match room.alike[..used].iter().position(|group| group.step == step) {
-                Some(known) => &mut room.alike[known],
-                None => {
-                    if used == room.alike.len() {
-                        room.alike.push(Alike::default());
-                    }
-                    used += 1;
-                    let group = &mut room.alike[used - 1];
-                    (group.step, group.count, group.integrals) = (step, 0.0, [0.0; 2]);
-                    group.lengths.clear();
-                    group.lengths.resize(maps.len(), 0.0);
-                    group
+            let p = integrals[cell];
+            let known = room.known.of(p);
+            if *known == NONE {
+                *known = used as u8;
+                if used == room.alike.len() {
+                    room.alike.push(Alike::default());
                 }
-            };
+                let group = &mut room.alike[used];
+                (group.first, group.count, group.integrals) = (p, 0.0, [0.0; 2]);
+                group.lengths.clear();
+                group.lengths.resize(maps.len(), 0.0);
+                used += 1;
+            }
+            let group = &mut room.alike[*known as usize];
             group.count += 1.0;
             group.integrals[0] += p;
             group.integrals[1] += p * p;
-            group.lengths.iter_mut().zip(lengths()).for_each(|(sum, length)| *sum += length);
+            group.lengths.iter_mut().zip(maps).for_each(|(sum, map)| *sum += map.1[place][cell]);
         }
         let (mut sum, mut count) = ([0.0; 2], 0.0);
         for group in &mut room.alike[..used] {
+            *room.known.of(group.first) = NONE;
             let each = 1.0 / group.count;
             group.lengths.iter_mut().for_each(|length| *length *= each);
             let inside: f32 = group.lengths.iter().sum();

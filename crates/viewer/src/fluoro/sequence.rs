@@ -2,13 +2,14 @@
 
 use endowire_core::Result;
 
+use super::brightness::{Brightness, Control};
 use super::display::{Window, fitted, logarithm, picture};
 use super::scatter::shading;
 use super::{Fluoroscope, Signal};
 use crate::device::RefinedDevice;
 use crate::output::Image;
 use crate::spec::{Mode, ViewSpec};
-use crate::xray::{Blur, Detector};
+use crate::xray::{Blur, Detector, Exposure};
 
 /// Number of frames averaged for a mask or a stored angiogram.
 const MASK_FRAMES: u64 = 4;
@@ -67,6 +68,8 @@ pub(crate) struct Sequence {
     /// Time of a frame at the view's rate, s, and the time of the last frame.
     frame_s: f64,
     last_s: Option<f64>,
+    /// Automatic brightness control.
+    control: Control,
     /// Edge enhancement: how much, and the deviation of the blur whose loss it adds, pixels.
     edges: [f64; 2],
     /// Subtracted from −ln of each frame: the stored mask or angiogram, or shading.
@@ -86,6 +89,7 @@ pub(crate) struct Afterglow {
     frame: Vec<f32>,
     last_s: Option<f64>,
     mask: Vec<f32>,
+    brightness: Option<Brightness>,
 }
 
 impl Sequence {
@@ -101,6 +105,10 @@ impl Sequence {
             let values = logarithm(fluoroscope.still.signal.signal.clone());
             shading(&values, &shown, c_arm).iter().map(|v| share * v).collect()
         });
+        // What is subtracted needs the exposure of its mask.
+        let constant_s = if matches!(mode, Mode::Fluoro | Mode::Cine) { spec.xray.brightness_s } else { 0.0 };
+        let still = &fluoroscope.still.signal;
+        let control = Control::new(constant_s, fluoroscope.exposure.entrance_ngy, &shown, still);
         let mut shoulder = None;
         let window = match (mode, spec.xray.window) {
             // Line integrals refer to the open beam, signals to the reference.
@@ -142,6 +150,7 @@ impl Sequence {
             bits: spec.bits,
             noisy: spec.detector.noise,
             frame_s: 1.0 / spec.frames_per_s,
+            control,
             edges: [spec.xray.edges, EDGES_MM / c_arm.pixel_mm()],
             last_s: None,
             mask,
@@ -154,7 +163,12 @@ impl Sequence {
 
     /// The detector's memory of the last frame.
     pub(crate) fn into_afterglow(mut self) -> Afterglow {
-        Afterglow { frame: self.detector.take_stored(), last_s: self.last_s, mask: self.mask_read }
+        Afterglow {
+            frame: self.detector.take_stored(),
+            last_s: self.last_s,
+            mask: self.mask_read,
+            brightness: self.control.state(),
+        }
     }
 
     /// Continues with a detector's memory: the next mask is that of a run with the same motion.
@@ -162,6 +176,23 @@ impl Sequence {
         self.detector.store(afterglow.frame);
         self.last_s = afterglow.last_s;
         self.mask_before = afterglow.mask;
+        afterglow.brightness.into_iter().for_each(|state| self.control.go_on_from(state));
+    }
+
+    /// The automatic brightness control, for another view of the same run.
+    pub(crate) fn brightness(&self) -> Option<Brightness> {
+        self.control.state()
+    }
+
+    /// Goes on from the brightness of another view of the same run.
+    pub(crate) fn brighten(&mut self, state: Brightness) {
+        self.last_s = Some(state.time_s());
+        self.control.go_on_from(state);
+    }
+
+    /// The exposure of the last frame.
+    pub(crate) fn exposure(&self, settled: &Exposure) -> Exposure {
+        settled.times(self.control.gain())
     }
 
     /// Reads the next frame and displays it in the scene's mode. The first frame of a subtraction takes its mask
@@ -181,10 +212,12 @@ impl Sequence {
         }
         // The injections of a roadmap are those of its angiogram.
         let time = (self.mode != Mode::Roadmap).then_some(moment.time_s);
-        let signal = fluoroscope.signal(pulse, time)?;
+        let mut signal = fluoroscope.signal(pulse, time)?;
         // A frame that is drawn again, or before the last one, is one of a run at the view's rate.
         let since_s = self.last_s.map_or(self.frame_s, |last_s| moment.time_s - last_s);
-        self.detector.after(if since_s > 0.0 { since_s } else { self.frame_s });
+        let since_s = if since_s > 0.0 { since_s } else { self.frame_s };
+        self.detector.after(since_s);
+        self.control.expose(&mut signal, since_s, moment.time_s);
         self.last_s = Some(moment.time_s);
         let read = self.detector.read(signal.signal, signal.energy, self.kev, moment.frame);
         let mut values = logarithm(read);

@@ -76,8 +76,8 @@ impl Trunk {
     pub(super) fn motion(&self, spec: &TorsoSpec) -> BodyMotion {
         let [half, at] = HEART_MM;
         BodyMotion {
-            breath_mm: spec.breath_mm,
-            beat_mm: spec.beat_mm,
+            breath_mm: spec.breath_mm(),
+            beat_mm: spec.beat_mm(),
             diaphragm: self.diaphragm,
             apex: self.apex,
             heart: Vec3::new(self.spine[0] + at[0], self.middle_y - at[1], self.diaphragm + at[2]),

@@ -69,8 +69,8 @@ impl Rhythm {
             if of_mm > 0.0 { VesselMotion::new(&[mode]) } else { Ok(None) }
         };
         Ok(Self {
-            breath: wave(torso.breath_mm, Waveform::Breathing, torso.breath_s)?,
-            beat: wave(torso.beat_mm, Waveform::Heartbeat, 60.0 / flow.heart_rate_per_min)?,
+            breath: wave(torso.breath_mm(), Waveform::Breathing, torso.breath_s)?,
+            beat: wave(torso.beat_mm(), Waveform::Heartbeat, 60.0 / flow.heart_rate_per_min)?,
         })
     }
 
@@ -110,14 +110,14 @@ mod tests {
 
     #[test]
     fn a_breath_is_in_half_way_and_a_held_one_never() {
-        let torso = TorsoSpec { beat_mm: 4.0, ..TorsoSpec::default() };
+        let torso = TorsoSpec::default();
         let rhythm = Rhythm::new(&torso, &FlowSpec::default()).unwrap();
         let half_s = torso.breath_s / 2.0;
         assert!((rhythm.parts(half_s)[0] - 1.0).abs() < 1e-12);
         assert_eq!(rhythm.parts(0.0), [0.0; 2]);
         let beat_s = 60.0 / FlowSpec::default().heart_rate_per_min;
         assert!((rhythm.parts(0.2 * beat_s)[1] - 1.0).abs() < 1e-12);
-        let held = TorsoSpec { breath_mm: 0.0, beat_mm: 0.0, ..torso };
+        let held = TorsoSpec { breath_mm: Some(0.0), beat_mm: Some(0.0), ..torso };
         assert_eq!(Rhythm::new(&held, &FlowSpec::default()).unwrap().parts(half_s), [0.0; 2]);
     }
 }

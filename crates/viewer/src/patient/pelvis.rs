@@ -156,22 +156,25 @@ impl Trunk {
         let [hip_side, hip_front, hip_down] = HIP_MM;
         let at = |out: f64, back: f64, up: f64| self.pelvic(side * out, back - hip_front, up - hip_down);
         let upper = [
-            (at(hip_side - 8.0, 2.0, 6.0), 2.0),
-            (at(hip_side - 20.0, -10.0, -4.0), 10.0),
-            (at(50.0, -36.0, -5.0), 6.8),
+            // From the socket's outside: inside it a bone would be counted twice.
+            (at(hip_side - 23.0, -19.0, 4.0), 1.5),
+            (at(hip_side - 29.0, -22.0, 1.0), 8.0),
+            (at(48.0, -38.0, -4.0), 6.8),
             (at(26.0, -55.0, -13.0), 7.5),
-            (at(12.0, -62.0, -24.0), 9.0),
-            (at(9.0, -62.0, -38.0), 6.0),
+            (at(12.0, -62.0, -23.0), 8.5),
+            (at(8.5, -62.0, -34.0), 6.5),
+            (at(10.0, -60.0, -42.0), 1.5),
         ];
         let lower = [
-            (at(hip_side - 4.0, 6.0, 10.0), 2.0),
-            (at(hip_side - 14.0, 12.0, -10.0), 12.0),
-            (at(hip_side - 20.0, 22.0, -36.0), 11.5),
+            (at(hip_side - 14.0, 25.0, -16.0), 1.5),
+            (at(hip_side - 17.0, 27.0, -27.0), 9.5),
+            (at(hip_side - 21.0, 26.0, -42.0), 11.5),
             (at(hip_side - 27.0, 26.0, -60.0), 14.0),
             (at(53.0, 18.0, -72.0), 10.5),
             (at(36.0, -14.0, -62.0), 6.0),
-            (at(22.0, -38.0, -50.0), 5.5),
-            (at(11.0, -58.0, -40.0), 6.0),
+            (at(23.0, -38.0, -52.0), 5.0),
+            (at(15.0, -53.0, -46.0), 4.0),
+            (at(11.0, -58.0, -42.0), 1.5),
         ];
         for path in [&upper[..], &lower[..]] {
             tube(mesh, &smooth(path, inset));
@@ -183,8 +186,10 @@ impl Trunk {
         let at = |out: f64, back: f64, up: f64| self.pelvic(side * out, back - hip_front, up - hip_down);
         ellipsoid(mesh, at(hip_side, 0.0, -4.0), Vec3::repeat(23.5 - inset));
         let neck = [
-            (at(hip_side + 12.0, 1.0, -8.0), 14.5),
-            (at(hip_side + 24.0, 4.0, -17.0), 13.0),
+            // From the head's surface, as what is inside would be counted twice.
+            (at(hip_side + 18.0, 2.5, -12.5), 4.5),
+            (at(hip_side + 20.5, 3.0, -14.0), 11.5),
+            (at(hip_side + 27.0, 5.0, -20.0), 13.0),
             (at(hip_side + 38.0, 8.0, -32.0), 16.0),
             (at(hip_side + 43.0, 9.0, -52.0), 17.0),
             (at(hip_side + 39.0, 6.0, -84.0), 15.0),

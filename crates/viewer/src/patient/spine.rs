@@ -153,12 +153,13 @@ fn arch(mesh: &mut SurfaceMesh, vertebra: &Vertebra, inset: f64) {
         ];
         bar(mesh, &root, inset);
         let reach = vertebra.reach * (1.0 + 0.5 * DIFFERS * side * vertebra.own(8));
-        let slim = if lumbar { 2.9 } else { 3.7 };
-        let rise = if lumbar { 0.12 * half } else { 3.0 } + 2.0 * vertebra.own(9);
+        // Blades in the loins, which a picture hardly shows at their tips.
+        let (slim, tip) = if lumbar { (2.5, 0.5) } else { (3.7, 0.9) };
+        let rise = if lumbar { 0.25 * half } else { 3.0 } + 2.0 * vertebra.own(9);
         let process = [
             (at(side * (apart + 1.0), 8.5, high - 1.0), thick.min(slim + 1.0)),
             (at(side * 0.6 * (reach + apart), 10.0, high + 0.4 * rise), slim),
-            (at(side * reach, 12.5, high + rise), 0.9 * slim),
+            (at(side * reach, 12.5, high + rise), tip * slim),
         ];
         tube(mesh, &smooth(&process, inset));
         let lamina = [

@@ -46,13 +46,23 @@ pub(crate) struct Texture {
 impl Texture {
     /// Changes the lengths of the central rays of all pixels.
     pub(crate) fn apply(&self, of: Of, lengths: &mut [f32], c_arm: &CArm) {
+        self.apply_again(of, lengths, c_arm, &mut vec![]);
+    }
+
+    /// The same with the noise that other lengths on these rays have met, not a number where there is none yet.
+    pub(crate) fn apply_again(&self, of: Of, lengths: &mut [f32], c_arm: &CArm, met: &mut Vec<f64>) {
         let width = c_arm.size_px()[0] as usize;
         let sheets = self.sheets(of);
-        let rows = lengths.par_chunks_mut(width).with_min_len(FEWEST_ROWS).enumerate();
-        rows.for_each(|(y, row)| {
-            for (x, length) in row.iter_mut().enumerate().filter(|(_, length)| **length > 0.0) {
-                let (source, direction) = c_arm.ray([x as f64 + 0.5, y as f64 + 0.5]);
-                let noise = sheets.along(&source, &direction);
+        met.resize(lengths.len(), f64::NAN);
+        let rows = lengths.par_chunks_mut(width).zip(met.par_chunks_mut(width)).with_min_len(FEWEST_ROWS);
+        rows.enumerate().for_each(|(y, (row, met))| {
+            let all = row.iter_mut().zip(met).enumerate();
+            for (x, (length, noise)) in all.filter(|(_, (length, _))| **length > 0.0) {
+                if noise.is_nan() {
+                    let (source, direction) = c_arm.ray([x as f64 + 0.5, y as f64 + 0.5]);
+                    *noise = sheets.along(&source, &direction);
+                }
+                let noise = *noise;
                 let mm = f64::from(*length);
                 let share = match of {
                     Of::Tissue => TISSUE_MM / libm::sqrt(mm * TISSUE_OF_MM),
@@ -124,12 +134,9 @@ impl Sheets {
 
 /// Noise between the points of a lattice, by smooth steps.
 fn between(at: [f64; 2], seed: u32) -> f64 {
-    let low = at.map(f64::floor);
-    let [u, v] = [0, 1].map(|k| {
-        let t = at[k] - low[k];
-        t * t * (3.0 - 2.0 * t)
-    });
-    let [x, y] = low.map(|x| x as i32);
+    // Rounded down, without a call.
+    let [x, y] = at.map(|x| x as i32 - i32::from(f64::from(x as i32) > x));
+    let [u, v] = [at[0] - f64::from(x), at[1] - f64::from(y)].map(|t| t * t * (3.0 - 2.0 * t));
     let value = |x: i32, y: i32| lattice(x, y, seed);
     let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
     let (x1, y1) = (x.wrapping_add(1), y.wrapping_add(1));

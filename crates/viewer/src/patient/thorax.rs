@@ -126,7 +126,7 @@ impl Trunk {
             (0..20)
                 .map(|k| {
                     let (s, c) = libm::sincos(TAU * f64::from(k) / 20.0);
-                    front + Vec3::new((half - inset) * c, (5.5 - inset) * s, 0.0)
+                    front + Vec3::new((half - inset) * c, (6.0 - inset) * s, 0.0)
                 })
                 .collect()
         };

@@ -36,6 +36,8 @@ const NECK_MM: [f64; 2] = [60.0, 64.0];
 const NECK_ABOVE_MM: [f64; 2] = [38.0, 105.0];
 /// Height of the head above the neck, and its half width and half depth.
 const HEAD_MM: [f64; 3] = [165.0, 78.0, 98.0];
+/// Least squareness of the trunk's front.
+const FRONT_POWER: f64 = 1.0;
 /// Squareness of the head below its middle, where occiput and neck are full; above, it is an ellipsoid.
 const OCCIPUT_POWER: f64 = 2.6;
 
@@ -65,10 +67,13 @@ fn mix(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }
 
-/// A point of a superellipse, squarer than an ellipse for powers below one, at an angle from the back towards the left.
+/// A point of a superellipse, squarer than an ellipse for powers below one, at an angle from the back towards the left;
+/// its front is an ellipse: who lies on a flat back has ribs that fall away to both sides of the breastbone.
 fn oval(half: [f64; 2], power: f64, angle: f64) -> [f64; 2] {
+    let (s, c) = libm::sincos(angle);
+    let power = if c < 0.0 { mix(power, FRONT_POWER.max(power), step(-c, 0.0, 0.5)) } else { power };
     let of = |v: f64| v.signum() * libm::pow(v.abs(), power);
-    [half[0] * of(libm::sin(angle)), half[1] * of(libm::cos(angle))]
+    [half[0] * of(s), half[1] * of(c)]
 }
 
 impl Trunk {

@@ -46,7 +46,7 @@ impl Renderer {
             let maps = scope.inside_devices(&devices)?;
             Ok((maps, injected(setup, scope, &devices, time_s)))
         })?;
-        let Anatomy { body, bone, mut lung, lumen, faded } = self.central.clone().unwrap_or_default();
+        let Anatomy { body, bone, mut lung, lumen, faded, .. } = self.central.clone().unwrap_or_default();
         if let Some((scope, _)) = &self.fluoro {
             scope.add_air(&mut lung);
         }

@@ -18,6 +18,10 @@ pub struct PatientSpec {
     pub torso: Option<TorsoSpec>,
     /// A computed tomogram.
     pub ct: Option<CtSpec>,
+    /// Whether the scene's vessel moves (`[[vessel.motion]]`): it takes the body along, which has no motion of its own
+    /// then.
+    #[serde(skip)]
+    pub vessel_moves: bool,
 }
 
 /// The `[view.patient.torso]` table: a generated body of soft tissue, bones and air, in patient axes.
@@ -44,14 +48,31 @@ pub struct TorsoSpec {
     /// Width of the table that the body lies on, 200 to 1000: a plate of carbon fibre between two rails of aluminium.
     /// Absent: no table.
     pub table_mm: Option<f64>,
-    /// How far the diaphragm goes down with each breath, 0 (held) to 40. It begins to breathe in at time zero. A
-    /// vessel that moves takes the body along instead (`[[vessel.motion]]`), and subtractions hold the breath.
-    pub breath_mm: f64,
+    /// How far the diaphragm goes down with each breath, 0 (held) to 40; absent: 12. It begins to breathe in at time
+    /// zero, and subtractions hold the breath. Where the vessel moves (`[[vessel.motion]]`), it takes the body along, and
+    /// only 0 may be given.
+    pub breath_mm: Option<f64>,
     /// Duration of a breath, 1 to 60.
     pub breath_s: f64,
-    /// How far the borders of the heart go in with each beat, 0 (it rests) to 15; it beats at `flow.heart_rate_per_min`. Together with a breath
-    /// its border shows lines: the two motions are drawn one beside the other.
-    pub beat_mm: f64,
+    /// How far the borders of the heart go in with each beat, 0 (it rests) to 15; absent: 4. It beats at
+    /// `flow.heart_rate_per_min`. Beside a vessel that moves as `breath_mm`.
+    pub beat_mm: Option<f64>,
+}
+
+/// What diaphragm and heart move if a scene does not say, mm: a quiet breath, and the border of a heart.
+const BREATH_MM: f64 = 12.0;
+const BEAT_MM: f64 = 4.0;
+
+impl TorsoSpec {
+    /// How far the diaphragm goes down with a breath.
+    pub(crate) fn breath_mm(&self) -> f64 {
+        self.breath_mm.unwrap_or(BREATH_MM)
+    }
+
+    /// How far the heart's borders go in with a beat.
+    pub(crate) fn beat_mm(&self) -> f64 {
+        self.beat_mm.unwrap_or(BEAT_MM)
+    }
 }
 
 impl Default for TorsoSpec {
@@ -66,9 +87,9 @@ impl Default for TorsoSpec {
             lungs: true,
             electrodes: true,
             table_mm: None,
-            breath_mm: 12.0,
+            breath_mm: None,
             breath_s: 4.0,
-            beat_mm: 0.0,
+            beat_mm: None,
         }
     }
 }
@@ -97,11 +118,19 @@ impl PatientSpec {
             finite_within("view.patient.torso.width_mm", torso.width_mm, [100.0, 800.0])?;
             finite_within("view.patient.torso.depth_mm", torso.depth_mm, [80.0, 600.0])?;
             for (key, value, range) in [
-                ("breath_mm", torso.breath_mm, [0.0, 40.0]),
+                ("breath_mm", torso.breath_mm.unwrap_or(0.0), [0.0, 40.0]),
                 ("breath_s", torso.breath_s, [1.0, 60.0]),
-                ("beat_mm", torso.beat_mm, [0.0, 15.0]),
+                ("beat_mm", torso.beat_mm.unwrap_or(0.0), [0.0, 15.0]),
             ] {
                 finite_within(&format!("view.patient.torso.{key}"), value, range)?;
+            }
+            let own = [("breath_mm", torso.breath_mm), ("beat_mm", torso.beat_mm)];
+            let own =
+                own.into_iter().filter_map(|(key, value)| Some((key, value.filter(|value| *value > 0.0)?)));
+            if let Some((key, value)) = own.filter(|_| self.vessel_moves).next() {
+                let remedy = "the vessel moves ([[vessel.motion]]) and takes the body along: leave this out, or give the \
+                              vessel this motion too";
+                return Err(Error::parameter(format!("view.patient.torso.{key}"), value, remedy));
             }
             for x in torso.spine_mm.into_iter().flatten() {
                 finite_within("view.patient.torso.spine_mm", x, COORDINATE_MM)?;

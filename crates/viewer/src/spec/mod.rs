@@ -160,6 +160,10 @@ pub struct CameraSpec {
     /// Force whose arrow is as long as that of the legend, 0.000001 to 1000 N: one scale for all frames. Absent: the
     /// largest of each frame; of all that it draws in `endowire render`.
     pub force_n: Option<f64>,
+    /// By how much the picture is magnified about its middle, 0.1 to 100.
+    pub magnification: f64,
+    /// How far its middle goes to the right and up, in widths of the picture without magnification, each -10 to 10.
+    pub shift: [f64; 2],
     /// Whether the beam of the C-arm is drawn; the camera then moves back to show the field at the isocentre.
     pub c_arm: bool,
 }
@@ -174,6 +178,8 @@ impl Default for CameraSpec {
             scale_bar: true,
             markers: true,
             force_n: None,
+            magnification: 1.0,
+            shift: [0.0; 2],
             c_arm: false,
         }
     }
@@ -269,6 +275,10 @@ impl ViewSpec {
         {
             finite_within(&format!("view.camera.{key}"), angle.unwrap_or(0.0), [-360.0, 360.0])?;
         }
+        finite_within("view.camera.magnification", self.camera.magnification, [0.1, 100.0])?;
+        for share in self.camera.shift {
+            finite_within("view.camera.shift", share, [-10.0, 10.0])?;
+        }
         finite_within("view.camera.force_n", self.camera.force_n.unwrap_or(1.0), FORCE_N)?;
         for (key, turn) in
             [("turn_deg", self.camera.turn_deg), ("orbit_deg", self.camera.orbit_deg.unwrap_or(0.0))]
@@ -347,7 +357,10 @@ mod tests {
     #[test]
     fn each_bad_value_names_its_key() {
         type Spoil = fn(&mut ViewSpec);
-        let cases: [(&str, Spoil); 55] = [
+        let cases: [(&str, Spoil); 58] = [
+            ("camera.magnification", |s| s.camera.magnification = 0.0),
+            ("camera.shift", |s| s.camera.shift = [0.0, 11.0]),
+            ("xray.brightness_s", |s| s.xray.brightness_s = 10.1),
             ("xray.edges", |s| s.xray.edges = 5.1),
             ("camera.force_n", |s| s.camera.force_n = Some(0.0)),
             ("size_px", |s| s.size_px = [0, 10]),
@@ -384,7 +397,7 @@ mod tests {
                 s.patient.torso = Some(TorsoSpec { width_mm: f64::NAN, ..TorsoSpec::default() });
             }),
             ("torso.breath_mm", |s| {
-                s.patient.torso = Some(TorsoSpec { breath_mm: 41.0, ..TorsoSpec::default() });
+                s.patient.torso = Some(TorsoSpec { breath_mm: Some(41.0), ..TorsoSpec::default() });
             }),
             ("torso.breath_s", |s| {
                 s.patient.torso = Some(TorsoSpec { breath_s: 0.0, ..TorsoSpec::default() });

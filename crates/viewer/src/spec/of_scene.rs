@@ -34,6 +34,7 @@ impl ViewSpec {
     ) -> Result<Self> {
         let ViewTable { view } = parse_toml(scene.text(), path)?;
         let mut view = view.in_folder(&scene.resolve(Path::new("")));
+        view.patient.vessel_moves = !scene.vessel.motion.is_empty();
         let own = scene.vessel.tree.as_ref().or(scene.vessel.centreline.as_ref());
         if let (None, Some(tree)) = (&view.flow.tree, own) {
             view.flow.tree = Some(scene.resolve(tree));

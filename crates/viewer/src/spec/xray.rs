@@ -44,6 +44,9 @@ pub struct XRaySpec {
     /// Length of a pulse: a frame shows motion over this time, up to the frame's time. From 0, instantaneous, to the
     /// time between two frames.
     pub pulse_ms: f64,
+    /// Time constant of the automatic brightness control in fluoroscopy and cine, 0 (exposure is held) to 10: how fast
+    /// the tube follows the mean signal between the blades when medium, blades or C-arm change it.
+    pub brightness_s: f64,
     /// Filtration, aluminium; 0 to 20.
     pub aluminium_mm: f64,
     /// Filtration, copper; 0 to 5.
@@ -83,6 +86,7 @@ impl Default for XRaySpec {
             mode: Mode::Fluoro,
             kvp: 80.0,
             pulse_ms: 0.0,
+            brightness_s: 0.3,
             aluminium_mm: 2.5,
             copper_mm: 0.2,
             energy_bins: None,
@@ -106,6 +110,7 @@ impl XRaySpec {
             Material::SoftTissue.attenuation_per_mm(energy)?;
         }
         check_kvp(self.kvp)?;
+        finite_within("view.xray.brightness_s", self.brightness_s, [0.0, 10.0])?;
         finite_within("view.xray.aluminium_mm", self.aluminium_mm, [0.0, 20.0])?;
         finite_within("view.xray.copper_mm", self.copper_mm, [0.0, 5.0])?;
         if let Some(count) = self.energy_bins.filter(|count| !(1..=1000).contains(count)) {

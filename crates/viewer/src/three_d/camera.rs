@@ -44,10 +44,31 @@ impl Camera {
         let axes = axes_from(&turned(&first, spec.turn_deg));
         let longer = f64::from(size_px[0].max(size_px[1]));
         let tangents = size_px.map(|n| libm::tan(HALF_ANGLE_DEG.to_radians()) * f64::from(n) / longer);
-        if let Some(orbit_deg) = spec.orbit_deg {
-            return Self::orbiting(&first, axes, orbit_deg, (tangents, size_px), wall, beside);
-        }
+        let fitted = match spec.orbit_deg {
+            Some(orbit_deg) => Self::orbiting(&first, axes, orbit_deg, (tangents, size_px), wall, beside),
+            None => Self::fitted(axes, (tangents, size_px), wall, beside),
+        };
+        fitted.nearer(spec)
+    }
 
+    /// Magnified and shifted.
+    fn nearer(mut self, spec: &CameraSpec) -> Self {
+        let distance = f64::midpoint(self.wall_range[0], self.wall_range[1]);
+        let width_mm = 2.0 * self.tangents[0] * distance;
+        for (axis, share) in self.axes.iter().zip(spec.shift) {
+            self.eye_mm += axis * (share * width_mm);
+        }
+        self.tangents = self.tangents.map(|tangent| tangent / spec.magnification);
+        self
+    }
+
+    /// As near as the whole is seen.
+    fn fitted(
+        axes: [Vec3; 3],
+        (tangents, size_px): ([f64; 2], [u32; 2]),
+        wall: &SurfaceMesh,
+        beside: &[Vec3],
+    ) -> Self {
         // A vertex at (x, y, z) is in the frame of an eye at (cx, cy, D) if |x − cx| ≤ k (D − z): the extremes of x +
         // kz and −x + kz give the smallest D and the corresponding centre, for each direction separately.
         let local: Vec<[f64; 3]> = wall.vertices_mm.iter().map(|v| axes.map(|axis| v.dot(&axis))).collect();
@@ -219,6 +240,29 @@ mod tests {
             }
             assert!((widest - FILL).abs() < 1e-9, "{size:?}: {widest}");
         }
+    }
+
+    #[test]
+    fn a_magnified_view_shows_its_shifted_middle_larger() {
+        let wall = cloud(80.0, 20.0, 50.0);
+        let camera = |magnification: f64, shift: [f64; 2]| {
+            let spec = CameraSpec { magnification, shift, ..CameraSpec::default() };
+            Camera::new(&spec, [400, 400], &wall, &[])
+        };
+        let (usual, near) = (camera(1.0, [0.0; 2]), camera(4.0, [0.25, -0.125]));
+        let at = |camera: &Camera, p: &Vec3| camera.pixel_of(camera.in_view(p), 1);
+        // What was a quarter of the width to the right of the middle and an eighth below it, at the middle's depth.
+        let depth = f64::midpoint(usual.wall_range[0], usual.wall_range[1]);
+        let width_mm = usual.pixel_mm_at(depth) * 400.0;
+        let place = |right: f64, down: f64| {
+            usual.eye_mm - usual.axes[2] * depth + usual.axes[0] * (right * width_mm)
+                - usual.axes[1] * (down * width_mm)
+        };
+        assert!(
+            at(&usual, &place(0.25, 0.125)).iter().zip([300.0, 250.0]).all(|(a, b)| (a - b).abs() < 1e-9)
+        );
+        assert!(at(&near, &place(0.25, 0.125)).iter().all(|x| (x - 200.0).abs() < 1e-9));
+        assert!((at(&near, &place(0.26, 0.125))[0] - 216.0).abs() < 1e-9, "four times as large");
     }
 
     #[test]

@@ -97,6 +97,14 @@ impl Exposure {
     }
 }
 
+impl Exposure {
+    /// The same at this multiple of the tube's output.
+    pub(crate) fn times(&self, gain: f64) -> Self {
+        let pulse = self.pulse.map(|pulse| Pulse { current_ma: pulse.current_ma * gain, ..pulse });
+        Self { dose_ngy: self.dose_ngy * gain, entrance_ngy: self.entrance_ngy * gain, pulse, ..*self }
+    }
+}
+
 fn kvp(step: usize) -> f64 {
     FIRST_KVP + STEP_KVP * step as f64
 }

@@ -28,7 +28,7 @@ fn view(mode: Mode) -> ViewSpec {
     };
     view.c_arm.pose = Some("LAO 40".parse().unwrap());
     // At rest at any time.
-    view.patient.torso = Some(TorsoSpec { breath_mm: 0.0, beat_mm: 0.0, ..TorsoSpec::default() });
+    view.patient.torso = Some(TorsoSpec { breath_mm: Some(0.0), beat_mm: Some(0.0), ..TorsoSpec::default() });
     with_injection(view, "aortic_arch", [-38.4, -54.8, 136.0], mode)
 }
 
@@ -155,8 +155,8 @@ fn of_sequences(twin: bool) -> Vec<(String, Image)> {
     thick.patient.torso = Some(TorsoSpec {
         width_mm: 480.0,
         depth_mm: 450.0,
-        breath_mm: 0.0,
-        beat_mm: 0.0,
+        breath_mm: Some(0.0),
+        beat_mm: Some(0.0),
         ..TorsoSpec::default()
     });
     (thick.xray.pulse_ms, thick.exposure) = (8.0, (!twin).then(ExposureSpec::default));

@@ -6,8 +6,8 @@ use common::*;
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree};
 use endowire_viewer::{
-    Backend, DetectorSpec, DevicePart, DeviceView, FrameTime, Image, InjectionSpec, Material, Mode, Renderer,
-    TorsoSpec, ViewSpec,
+    Backend, CArmSpec, DetectorSpec, DevicePart, DeviceView, FrameTime, Image, InjectionSpec, Material, Mode,
+    Renderer, TorsoSpec, ViewSpec,
 };
 
 /// A straight vessel along z with its centre line, blood rising; contrast medium from 1 s to 2 s.
@@ -495,4 +495,83 @@ fn what_blades_close_is_black_in_every_mode_and_what_they_leave_is_not() {
         assert!(corner.into_iter().all(|(x, y)| noisy.pixel(x, y).unwrap()[0] == 0), "{mode:?}");
     }
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn medium_and_blades_brighten_a_live_picture_over_some_frames() {
+    let folder = folder("brightness");
+    // Grey of a corner that medium does not reach, and of what blades leave, at some times.
+    let greys = |constant_s: f64, mode: Mode, per_s: u32| {
+        let (mut view, wall) = scene(&folder, mode);
+        view.detector = DetectorSpec::ideal();
+        view.xray.brightness_s = constant_s;
+        view.injection[0].rate_ml_per_s = 20.0;
+        view.injection[0].duration_s = 10.0;
+        view.frames_per_s = f64::from(per_s);
+        let mut renderer = Renderer::new(&view, &wall).unwrap();
+        let frame = |k: u32| (0.5 + f64::from(k) / f64::from(per_s), u64::from(k));
+        let drawn = (0..=4 * per_s).map(frame).map(|(time_s, number)| {
+            let image = renderer.render_at(&[], at(number, time_s)).unwrap().fluoro.unwrap();
+            grey(&image, 10..20, 40..120)
+        });
+        drawn.collect::<Vec<f64>>()
+    };
+    let live = greys(0.3, Mode::Fluoro, 15);
+    let [before, after] = [live[0], live[live.len() - 1]];
+    assert!(after > before + 3.0, "{before} {after}");
+    // Over some frames, and by as much at another rate.
+    assert!(live.windows(2).all(|pair| pair[1] - pair[0] < 0.4 * (after - before)), "{live:?}");
+    let slower = greys(0.3, Mode::Fluoro, 5);
+    assert!((slower[slower.len() - 1] - after).abs() < 1.5, "{after} {slower:?}");
+    // The twins: exposure that is held, and a subtraction, which needs that of its mask.
+    for held in [greys(0.0, Mode::Fluoro, 15), greys(0.3, Mode::Dsa, 15)] {
+        assert!((held[held.len() - 1] - held[0]).abs() < 1.0, "{held:?}");
+    }
+
+    // Blades that leave the denser middle of a body: dark at first, then as if they had always been there.
+    let (mut view, wall) = scene(&folder, Mode::Fluoro);
+    view.detector = DetectorSpec::ideal();
+    view.patient.torso = Some(TorsoSpec { breath_mm: Some(0.0), beat_mm: Some(0.0), ..TorsoSpec::default() });
+    view.c_arm.pixel_mm = Some(2.4);
+    let narrow = ViewSpec {
+        c_arm: CArmSpec { collimation_mm: Some([60.0, 120.0]), ..view.c_arm.clone() },
+        ..view.clone()
+    };
+    let mean = |renderer: &mut Renderer, k: u32| {
+        let frame = at(u64::from(k), f64::from(k) / 15.0 - 5.0);
+        grey(&renderer.render_at(&[], frame).unwrap().fluoro.unwrap(), 75..85, 70..90)
+    };
+    let settled = mean(&mut Renderer::new(&narrow, &wall).unwrap(), 0);
+    let mut renderer = Renderer::new(&view, &wall).unwrap();
+    mean(&mut renderer, 0);
+    renderer.turn_c_arm(&narrow.c_arm).unwrap();
+    let closing: Vec<f64> = (1..=30).map(|k| mean(&mut renderer, k)).collect();
+    assert!(closing[0] < settled - 5.0, "{settled} {closing:?}");
+    assert!(closing.windows(2).all(|pair| pair[1] >= pair[0]), "{closing:?}");
+    assert!((closing[29] - settled).abs() < 1.0, "{settled} {closing:?}");
+    // A view that goes on from the brightness of another is as one that has moved there.
+    let mut other = Renderer::new(&view, &wall).unwrap();
+    mean(&mut other, 0);
+    let state = other.brightness().unwrap();
+    other.change(&narrow).unwrap();
+    other.brighten(state).unwrap();
+    assert_eq!(mean(&mut other, 1), closing[0]);
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn a_body_beside_a_vessel_that_moves_has_no_motion_of_its_own() {
+    let of = |moves: bool, breath_mm: Option<f64>, beat_mm: Option<f64>| {
+        let mut view = ViewSpec::default();
+        view.patient.vessel_moves = moves;
+        view.patient.torso = Some(TorsoSpec { breath_mm, beat_mm, ..TorsoSpec::default() });
+        view.validate().map_err(|error| error.to_string())
+    };
+    for (key, breath_mm, beat_mm) in [("breath_mm = 9", Some(9.0), None), ("beat_mm = 3", None, Some(3.0))] {
+        let error = of(true, breath_mm, beat_mm).unwrap_err();
+        assert!(error.contains(key) && error.contains("[[vessel.motion]]"), "{error}");
+        // The twins: a vessel that rests, and a body that does.
+        assert!(of(false, breath_mm, beat_mm).is_ok());
+    }
+    assert!(of(true, None, None).is_ok() && of(true, Some(0.0), Some(0.0)).is_ok());
 }

@@ -130,8 +130,12 @@ fn the_air_of_a_body_goes_with_its_vessel_and_bones_and_skin_stay() {
 fn a_body_breathes_in_live_pictures_by_as_much_as_it_is_told_and_rests_in_subtractions_and_when_held() {
     let renderer = |mode: Mode, breath_mm: f64| {
         let mut view = view(mode);
-        view.patient.torso =
-            Some(TorsoSpec { diaphragm_mm: Some(60.0), breath_mm, beat_mm: 0.0, ..TorsoSpec::default() });
+        view.patient.torso = Some(TorsoSpec {
+            diaphragm_mm: Some(60.0),
+            breath_mm: Some(breath_mm),
+            beat_mm: Some(0.0),
+            ..TorsoSpec::default()
+        });
         view.c_arm.isocentre_mm = Some([0.0, 0.0, 60.0]);
         Renderer::new(&view, &vessel()).unwrap()
     };

@@ -172,12 +172,14 @@ fn view(spec: &Spec, scene: &Scene, file: &Path, other_device: bool) -> Result<V
     if other_device {
         of_scene.device.clear();
     }
+    let vessel_moves = of_scene.patient.vessel_moves;
     let mut table = serde_json::to_value(of_scene).map_err(bad)?;
     merge(&mut table, &spec.view);
     let mut view: ViewSpec = serde_json::from_value(table).map_err(bad)?;
+    view.patient.vessel_moves = vessel_moves;
     view.views = vec![View::Fluoro];
     // States are drawn at random, so the previous picture is not the previous state.
-    view.detector.lag = 0.0;
+    (view.detector.lag, view.xray.brightness_s) = (0.0, 0.0);
     view.c_arm.pose = None;
     if let Mode::Dsa | Mode::Roadmap = view.xray.mode {
         // What such a picture shows depends on the moments before it.

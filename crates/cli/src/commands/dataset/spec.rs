@@ -82,7 +82,7 @@ impl Default for Vary {
 }
 
 /// Keys of `[view]` that change nothing in the pictures of a dataset, and what to do instead.
-pub(super) const NOT_DRAWN: [(&str, &str); 11] = [
+pub(super) const NOT_DRAWN: [(&str, &str); 12] = [
     ("biplane_deg", "a dataset has biplane_deg beside its seed"),
     ("views", "a dataset draws fluoroscopy alone: leave the key out"),
     ("every", "moments are drawn: give moments, and vary.progress"),
@@ -93,6 +93,7 @@ pub(super) const NOT_DRAWN: [(&str, &str); 11] = [
     ("c_arm.secondary_deg", "poses are drawn: give vary.secondary_deg"),
     ("device", "device files say what their devices are made of (devices)"),
     ("detector.seed", "noise is drawn: give seed"),
+    ("xray.brightness_s", "times are drawn at random, and no picture follows another: leave it out"),
     ("detector.lag", "times are drawn at random, and no picture follows another: leave it out"),
 ];
 

@@ -30,6 +30,8 @@ const LATE: Duration = Duration::from_millis(100);
 pub(crate) enum Message {
     /// From the window.
     Input(Input),
+    /// Side of the pictures, pixels.
+    Side(u32),
     /// A line of the protocol, or why it is invalid, with the receiver of its answer.
     Line(std::result::Result<Line, String>, Reply),
     /// Standard input has ended.
@@ -193,6 +195,8 @@ pub(crate) fn physics(
                     // A refused input becomes an event of the session.
                     let _ = session.apply(&input);
                 }
+                // A side that a window has is valid.
+                Ok(Message::Side(side_px)) => drop(session.show_at(side_px)),
                 Ok(Message::Line(line, reply)) => {
                     input_at.get_or_insert_with(Instant::now);
                     let quits = matches!(line, Ok(Line::Order(Order::Quit {})));

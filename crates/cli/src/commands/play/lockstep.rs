@@ -36,6 +36,8 @@ pub(crate) fn run(
                 // A refused input becomes an event of the session.
                 let _ = session.apply(&input);
             }
+            // Only a window sends its own, which is valid.
+            Ok(Message::Side(side_px)) => drop(session.show_at(side_px)),
             Ok(Message::Line(line, reply)) => {
                 let quits = matches!(line, Ok(Line::Order(Order::Quit {})));
                 let done = match line {

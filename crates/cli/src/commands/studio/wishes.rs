@@ -193,5 +193,7 @@ pub(super) fn wished(mut spec: ViewSpec, args: &FrameArgs, default: ViewChoice) 
         let fits = serde_json::from_value::<ViewSpec>(table.clone()).map_err(|e| plain(&e.to_string()));
         fits.map_err(|e| failed(format!("{set}: {e}{}", nearest(&e))))?;
     }
-    serde_json::from_value(table).map_err(|e| failed(plain(&e.to_string())))
+    let mut view: ViewSpec = serde_json::from_value(table).map_err(|e| failed(plain(&e.to_string())))?;
+    view.patient.vessel_moves = spec.patient.vessel_moves;
+    Ok(view)
 }

@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use endowire_play::{Input, KEYS, Keys, Modifiers, Pictures, Session, Snapshot};
 use endowire_viewer::Image;
@@ -35,6 +35,8 @@ use text::{Canvas, Writer};
 /// Initial width, with one plane and with two, and height of the window.
 const WIDTHS: [u32; 2] = [1280, 1720];
 const HEIGHT: u32 = 860;
+/// Time after which the size of the pictures is chosen anew.
+const FIT_EVERY: Duration = Duration::from_secs(2);
 /// Rotation of the 3D view by a drag, degrees per pixel.
 const DEG_PER_PX: f64 = 0.4;
 
@@ -82,6 +84,8 @@ struct Shell {
     planes: usize,
     cursor: [f64; 2],
     dragging: bool,
+    /// Whether a drag moves the 3D view, and does not turn it.
+    moves: bool,
     /// Width of the fluoroscopic field at the isocentre, mm.
     field_mm: f64,
     /// Latencies from inputs to the pictures that show them, ms.
@@ -118,6 +122,7 @@ pub(super) fn run(
         planes: screen::planes(&session.readout()),
         cursor: [0.0; 2],
         dragging: false,
+        moves: false,
         field_mm: 0.0,
         inputs_ms: Vec::new(),
         failure: None,
@@ -128,7 +133,8 @@ pub(super) fn run(
     let (drawn_for, proxy) = (events.create_proxy(), events.create_proxy());
     std::thread::scope(|scope| {
         let newest = &newest;
-        let drawing = scope.spawn(move || draw(pictures, newest, &shared, writer, &drawn_for));
+        let to = shell.to.clone();
+        let drawing = scope.spawn(move || draw(pictures, newest, &shared, writer, (&drawn_for, &to)));
         let simulating = scope.spawn(move || {
             let done = live::physics(session, &messages, newest, record, false);
             live::end(newest);
@@ -156,8 +162,9 @@ fn draw(
     newest: &Newest,
     shared: &Shared,
     mut writer: Writer,
-    proxy: &EventLoopProxy<Event>,
+    (proxy, to): (&EventLoopProxy<Event>, &Sender<Message>),
 ) -> live::Frames {
+    let mut fitted = Instant::now();
     live::draw(pictures, newest, |shown| {
         let size = [0, 1].map(|side| shared.size[side].load(Ordering::Relaxed));
         if size.contains(&0) {
@@ -166,12 +173,29 @@ fn draw(
         let gamepad = shared.gamepad.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let help = shared.help.load(Ordering::Relaxed).then(|| help(gamepad.is_some()));
         let canvas = screen::compose(&mut writer, shown, size, help.as_deref(), gamepad.as_deref());
+        if fitted.elapsed() > FIT_EVERY && fit(shown, size, to) {
+            fitted = Instant::now();
+        }
         let mut picture = shared.picture.lock().unwrap_or_else(PoisonError::into_inner);
         let unseen = picture.take().and_then(|before| before.input_at);
         let field_mm = shown.moment.snapshot.readout.lab.field_mm;
         *picture = Some(Picture { canvas, input_at: unseen.or(shown.moment.input_at), field_mm });
         let _ = proxy.send_event(Event::Picture);
     })
+}
+
+/// Has live pictures drawn as large as they are shown, if there is time; returns whether there was a sharp one to tell by.
+fn fit(shown: &live::Shown<'_>, size: [usize; 2], to: &Sender<Message>) -> bool {
+    let lab = &shown.moment.snapshot.lab;
+    let side_px = lab.fluoro().size_px[0];
+    let sharp = shown.fluoro.first().is_some_and(|image| image.width() == side_px);
+    let Some(frame_ms) = shown.frame_ms.filter(|_| sharp && lab.is_live()) else { return false };
+    let layout = Layout::of(size, screen::planes(&shown.moment.snapshot.readout));
+    let fitting = endowire_play::fitting_side(layout.side as u32, side_px, frame_ms);
+    if fitting != side_px {
+        let _ = to.send(Message::Side(fitting));
+    }
+    true
 }
 
 /// Writes the window for a state as a PNG file, at its initial size. It is drawn in memory, so no display is needed.
@@ -234,6 +258,10 @@ impl Shell {
         }
     }
 
+    fn layout(&self) -> Layout {
+        Layout::of([0, 1].map(|side| self.shared.size[side].load(Ordering::Relaxed)), self.planes)
+    }
+
     /// Shows the newest picture in the window.
     fn present(&mut self) -> Result<(), String> {
         let Some(surface) = &mut self.surface else { return Ok(()) };
@@ -279,8 +307,7 @@ impl Shell {
     /// began.
     fn dragged(&mut self, x: f64, y: f64) {
         let by = [x - self.cursor[0], y - self.cursor[1]];
-        let size = [0, 1].map(|side| self.shared.size[side].load(Ordering::Relaxed));
-        let layout = Layout::of(size, self.planes);
+        let layout = self.layout();
         let plane = layout.plane_at(self.cursor[0], self.cursor[1]);
         self.cursor = [x, y];
         if !self.dragging || by == [0.0; 2] {
@@ -292,6 +319,10 @@ impl Shell {
                 let mm_per_px = self.field_mm / layout.side.max(1) as f64;
                 let second = plane == 1;
                 Input::Table { right_mm: -by[0] * mm_per_px, down_mm: -by[1] * mm_per_px, second }
+            }
+            None if self.moves => {
+                let width = layout.three_d.1.into_iter().min().unwrap_or(1).max(1) as f64;
+                Input::MoveCamera { right: -by[0] / width, up: by[1] / width }
             }
             None => Input::TurnCamera { azimuth_deg: -by[0] * DEG_PER_PX, elevation_deg: by[1] * DEG_PER_PX },
         }]);
@@ -331,6 +362,7 @@ impl ApplicationHandler<Event> for Shell {
             WindowEvent::KeyboardInput { event, .. } => self.key(events, &event),
             WindowEvent::ModifiersChanged(modifiers) => {
                 let held = |key| modifiers.state().contains(key);
+                self.moves = held(ModifiersState::SHIFT);
                 let inputs = self.keys.modify(Modifiers {
                     shift: held(ModifiersState::SHIFT),
                     control: held(ModifiersState::CONTROL),
@@ -342,15 +374,22 @@ impl ApplicationHandler<Event> for Shell {
                 self.send(inputs);
             }
             WindowEvent::CursorMoved { position, .. } => self.dragged(position.x, position.y),
-            WindowEvent::MouseInput { state, button: MouseButton::Left, .. } => {
+            WindowEvent::MouseInput { state, button, .. }
+                if matches!(button, MouseButton::Left | MouseButton::Right) =>
+            {
                 self.dragging = state == ElementState::Pressed;
+                if button == MouseButton::Right {
+                    self.moves = self.dragging;
+                }
             }
             WindowEvent::MouseWheel { delta, .. } => {
                 let lines = match delta {
                     MouseScrollDelta::LineDelta(_, y) => f64::from(y),
                     MouseScrollDelta::PixelDelta(by) => by.y / 40.0,
                 };
-                self.send([Input::Zoom { factor: 1.1_f64.powf(lines.clamp(-5.0, 5.0)) }]);
+                let factor = 1.1_f64.powf(lines.clamp(-5.0, 5.0));
+                let on_picture = self.layout().plane_at(self.cursor[0], self.cursor[1]).is_some();
+                self.send([if on_picture { Input::Zoom { factor } } else { Input::ZoomCamera { factor } }]);
             }
             _ => {}
         }

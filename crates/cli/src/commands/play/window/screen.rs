@@ -1,6 +1,6 @@
 //! Layout of the window: the live picture, the 3D view, forces, help.
 
-use endowire_play::{InstrumentReadout, LabReadout, Readout};
+use endowire_play::{IdleKey, InstrumentReadout, LabReadout, Readout};
 use endowire_viewer::{Image, Mode, PixelFormat};
 
 use super::super::live::Shown;
@@ -94,7 +94,7 @@ pub(super) fn compose(
         task::show(writer, &mut canvas, standing, readout.step > 0, &places);
     }
     if let Some(help) = help {
-        show_help(writer, &mut canvas, help);
+        show_help(writer, &mut canvas, help, &readout.idle_keys);
     }
     canvas
 }
@@ -225,13 +225,18 @@ fn signed(number: String) -> String {
     number.strip_prefix('-').filter(|_| is_zero).map(str::to_owned).unwrap_or(number)
 }
 
-fn show_help(writer: &mut Writer, canvas: &mut Canvas, help: &[Help]) {
-    let size = [620, 22 * help.len() + 24];
+/// Keys, which begin with those of [`endowire_play::KEYS`]; those that do nothing now are faint, with the reason.
+fn show_help(writer: &mut Writer, canvas: &mut Canvas, help: &[Help], idle: &[IdleKey]) {
+    let size = [canvas.size[0].saturating_sub(48).min(1180), 22 * help.len() + 24];
     canvas.fill([24, 24], size, 0x08_0c10);
     for (line, (keys, what)) in help.iter().enumerate() {
         let y = 52 + 22 * line;
-        writer.write(canvas, [40, y], 15, CHOSEN, keys);
-        writer.write(canvas, [270, y], 15, TEXT, what);
+        let why = endowire_play::idle_words(line, idle);
+        writer.write(canvas, [40, y], 15, if why.is_some() { FAINT } else { CHOSEN }, keys);
+        let end = writer.write(canvas, [270, y], 15, if why.is_some() { FAINT } else { TEXT }, what);
+        if let Some(why) = why {
+            writer.write(canvas, [end.max(560) + 20, y], 15, FAINT, &why);
+        }
     }
 }
 
