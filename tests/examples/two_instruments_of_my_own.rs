@@ -4,8 +4,8 @@
 use std::{ops::Range, path::Path, sync::Arc};
 
 use endowire_core::{
-    Command, Device, EnergyDensity, Field, GeneratedWall, Instrument, MaterialPoint, Move, Resolution, Section, Sheath,
-    Simulation, Stack, anatomy,
+    Command, Device, EnergyDensity, Field, GeneratedWall, Instrument, MaterialPoint, Move, Resolution,
+    Section, Sheath, Simulation, Stack, anatomy,
 };
 use endowire_recording::{Program, Provenance, Recorder, Recording};
 use endowire_viewer::{Pushed, Renderer, ViewSpec, section_parts};
@@ -52,7 +52,8 @@ pub(crate) fn main() -> endowire_core::Result<()> {
 
     let parts = stack.instruments().iter().map(|one| section_parts(&one.device)).collect();
     let views = Pushed::of_parts(stack, parts).views(simulation.shape(), &simulation.report().lengths_mm());
-    let mut renderer = Renderer::of_wall(&ViewSpec { size_px: [256, 256], ..ViewSpec::default() }, &vessel.wall)?;
+    let mut renderer =
+        Renderer::of_wall(&ViewSpec { size_px: [256, 256], ..ViewSpec::default() }, &vessel.wall)?;
     if let Some(picture) = renderer.render(&views)?.fluoro {
         picture.write_png(out.join("fluoro.png"))?;
     }
