@@ -33,6 +33,7 @@ pub struct RodState {
 
 impl RodState {
     /// A straight rod from `start` along `frame.t`, untwisted.
+    #[cfg(test)]
     pub(crate) fn straight(elements: &[ElementData], start: Vec3, frame: Frame) -> Self {
         Self::from_frames(elements, start, vec![frame; elements.len() + 1])
     }
