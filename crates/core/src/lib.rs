@@ -33,7 +33,7 @@
 //!
 //! | module | for whom |
 //! |---|---|
-//! | [`control`] | hands that steer: your own [`Controller`](control::Controller) |
+//! | [`control`] | hands that steer: your own [`Controller`] |
 //! | [`field`] | magnets, weight and your own energies |
 //! | [`methods`] | your own method behind [`Method`](methods::Method) |
 //! | [`device`], [`vessel`], [`flow`], [`scene`] | devices from data sheets; surfaces, their checks and repair; blood; scene files |
@@ -80,10 +80,10 @@ mod text;
 pub mod tuning;
 pub mod vessel;
 
+pub use control::{Controller, drive};
 pub use device::{Device, DeviceFile, Instrument, Section, Stack};
 pub use error::{Error, PhysicalEnd, Result};
-pub use field::Magnet;
-pub use field::{Field, Weight};
+pub use field::{EnergyDensity, Field, Magnet, MaterialPoint, Weight};
 pub use flow::BloodFlow;
 pub use insertion::{Batch, Command, Contact, Move, Sheath, Simulation, State, StepReport, WallProperties};
 pub use methods::kirchhoff::{Accuracy, KirchhoffOptions};

@@ -128,7 +128,7 @@ struct Reached {
 
 /// The smooth wall.
 #[derive(Debug, Clone)]
-pub struct SmoothWall {
+pub(crate) struct SmoothWall {
     quadrics: Vec<Quadric>,
     /// For every vertex, a triangle of which it is a corner.
     triangles: Vec<u32>,
@@ -145,7 +145,7 @@ pub struct SmoothWall {
 
 impl SmoothWall {
     /// The smooth surface of `wall` for devices with radii up to `thickest_mm`.
-    pub fn new(wall: &Wall, thickest_mm: f64) -> Self {
+    pub(crate) fn new(wall: &Wall, thickest_mm: f64) -> Self {
         let mesh = wall.mesh();
         let count = mesh.vertices_mm.len();
         let neighbours = Neighbours::new(&mesh.triangles, count);
@@ -331,7 +331,7 @@ impl SmoothWall {
     }
 
     /// The distance of `x`, given a triangle at or near the nearest. `None` where no vertex reaches.
-    pub fn distance(&self, x: &Vec3, triangle: u32) -> Option<Distance> {
+    pub(crate) fn distance(&self, x: &Vec3, triangle: u32) -> Option<Distance> {
         match self.within(x, triangle, f64::INFINITY)? {
             (Nearness::Within(distance), _) => Some(distance),
             (Nearness::Beyond(_) | Nearness::Clear(_), _) => None,

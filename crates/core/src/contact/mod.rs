@@ -29,7 +29,7 @@ pub(crate) mod surface;
 pub(crate) mod wall;
 
 pub use distance::Nearness;
-pub use moved::MovedWall;
+pub(crate) use moved::MovedWall;
 pub use pairs::Touching;
 pub use point::{Contact, Counters, Touch};
 pub use properties::{WallProperties, WallRegion};

@@ -47,7 +47,7 @@ use nalgebra::Matrix3;
 
 /// The contact surface at one displacement of its vessel. Methods through [`Deref`] refer to the reference.
 #[derive(Debug, Clone, Copy)]
-pub struct MovedWall<'a> {
+pub(crate) struct MovedWall<'a> {
     surface: &'a ContactSurface,
     displacement: Option<&'a Displacement>,
 }

@@ -81,7 +81,7 @@ impl Stiffness {
 
 /// Modulus and friction of a wall with regions.
 #[derive(Debug, Clone)]
-pub struct RegionMap {
+pub(crate) struct RegionMap {
     /// ln(kᵢ/k₀) of every vertex; none if all are 0.
     ln_moduli: Vec<f64>,
     /// μᵢ over the largest of all coefficients; none if all are 1.

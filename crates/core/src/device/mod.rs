@@ -153,6 +153,16 @@ impl Section {
 /// A device: its sections, **tip first**, because the tip is what enters first.
 ///
 /// Points of a device are identified by their arc length from the tip, which does not change as it is pushed.
+///
+/// ```
+/// use endowire_core::{Device, Section};
+///
+/// // 20 mm that rest in a bow of radius 20 mm, on a straight shaft: length mm, radius mm, bending stiffness N·mm².
+/// let tip = Section { rest_curvature_per_mm: [0.05, 0.0], ..Section::straight(20.0, 0.45, 5.0) };
+/// let wire = Device::new(vec![tip, Section::straight(280.0, 0.45, 20.0)])?;
+/// assert_eq!(wire.section_at(10.0).bending_stiffness_nmm2, 5.0);
+/// # Ok::<(), endowire_core::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Device {
     sections: Vec<Section>,

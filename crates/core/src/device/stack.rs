@@ -21,6 +21,18 @@ pub struct Instrument {
 }
 
 /// Instruments on one line, the innermost first; those that are never inserted at the same time may be alternatives.
+///
+/// ```
+/// use endowire_core::{Device, Instrument, Section, Stack};
+///
+/// let wire = Device::uniform(400.0, 0.4, 10.0)?;
+/// let tube = Section { inner_radius_mm: Some(0.5), ..Section::straight(300.0, 0.85, 40.0) };
+/// let catheter = Device::new(vec![tube])?;
+/// let instrument = |name: &str, device| Instrument { name: name.to_owned(), device, may_lead: true };
+/// let stack = Stack::new(vec![instrument("wire", wire), instrument("catheter", catheter)])?;
+/// assert_eq!(stack.instruments()[1].name, "catheter");
+/// # Ok::<(), endowire_core::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stack {
     instruments: Vec<Instrument>,

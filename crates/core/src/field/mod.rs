@@ -11,7 +11,7 @@
 //! changes nothing, not even the hand force. In Li et al. 2011 (eq. 1) it is the external energy.
 //!
 //! The integral uses three Gauss points on each element, or on the part of it on which the field acts. With q = (x₀, h t₀, x₁, h t₁), the
-//! unknowns of an element of length h, a point is r = Σ cᵢ qᵢ and its tangent r′ = Σ dᵢ qᵢ ([`hermite`](crate::rod::quadrature::hermite)), so
+//! unknowns of an element of length h, a point is r = Σ cᵢ qᵢ and its tangent r′ = Σ dᵢ qᵢ (`rod::quadrature`), so
 //!
 //! ```text
 //! ∂u/∂qᵢ = cᵢ uᵣ + dᵢ uₜ,    ∂²u/∂qᵢ∂qⱼ = cᵢcⱼ uᵣᵣ + cᵢdⱼ uᵣₜ + dᵢcⱼ uᵣₜᵀ + dᵢdⱼ uₜₜ

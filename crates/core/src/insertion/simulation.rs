@@ -19,6 +19,21 @@ use crate::{Error, Result, Vec3};
 ///
 /// Clones of a simulation share the device's environment, and may run on any threads; each has its own state and,
 /// from its first step on, its own workspace.
+///
+/// ```
+/// use endowire_core::{Command, Device, GeneratedWall, Resolution, Sheath, Simulation, anatomy};
+///
+/// let vessel = GeneratedWall::new(&anatomy::tree("straight_tube").expect("built in"), Resolution::EdgeMm(2.0))?;
+/// let sheath = Sheath::at_opening(&vessel.wall, vessel.inlet, 1.0)?;
+/// let mut simulation = Simulation::builder(vessel.wall, Device::uniform(200.0, 0.45, 10.0)?, sheath).build()?;
+/// simulation.step(Command::advance(10.0))?;
+///
+/// let state = simulation.state();                     // all that the next step depends on
+/// let push_n = simulation.step(Command::advance(10.0))?.push_force_n;
+/// simulation.restore(&state)?;                        // and back, to the bit
+/// assert_eq!(simulation.step(Command::advance(10.0))?.push_force_n, push_n);
+/// # Ok::<(), endowire_core::Error>(())
+/// ```
 pub struct Simulation {
     pub(super) scene: Arc<Environment>,
     pub(super) method: Box<dyn Method>,

@@ -40,23 +40,23 @@ pub(crate) struct RankOne {
 #[derive(Debug, Clone)]
 pub(crate) struct Assembly<const C: usize> {
     /// The augmented matrix.
-    pub matrix: BandMatrix<C>,
+    pub(crate) matrix: BandMatrix<C>,
     /// Blocks of the matrix outside its band, which couple nodes in contact.
     pub(crate) couplings: Couplings<C>,
     /// Gradient of the Lagrangian; in the rows of N, c − D N; in support rows, the gaps.
-    pub residual: Vec<f64>,
+    pub(crate) residual: Vec<f64>,
     /// γCᵀ(c − D N), added to the residual in the right-hand side.
-    pub correction: Vec<f64>,
+    pub(crate) correction: Vec<f64>,
     /// Elastic energy of the rod.
-    pub energy: Energy,
+    pub(crate) energy: Energy,
     /// Energy of everything outside the rod.
-    pub external_energy: f64,
+    pub(crate) external_energy: f64,
     /// Unsymmetric additions to the matrix.
     pub(crate) rank_ones: Vec<RankOne>,
     /// Largest force and moment an element exerts on a node: the scale of the residual.
-    pub scale: [f64; 2],
+    pub(crate) scale: [f64; 2],
     /// Whether the matrix is assembled as well as the residual. If not, it stays empty.
-    pub hessian: bool,
+    pub(crate) hessian: bool,
 }
 
 impl<const C: usize> Assembly<C> {

@@ -22,7 +22,7 @@ pub struct Clamp {
 impl Clamp {
     /// From the residual rows of the first node before they were held
     /// (`Newton::start_residual` of the solver).
-    pub fn new<const C: usize>(rows: &[f64; C], state: &RodState) -> Self {
+    pub(crate) fn new<const C: usize>(rows: &[f64; C], state: &RodState) -> Self {
         let l = Layout::<C>;
         let (x, t) = (l.position(0), l.tangent(0));
         let frame = &state.frames[0];

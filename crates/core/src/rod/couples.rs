@@ -18,29 +18,29 @@ pub(crate) const PLACES: usize = 8;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Couple {
     /// The element of the first point.
-    pub first: usize,
+    pub(crate) first: usize,
     /// The element of the second point.
-    pub second: usize,
+    pub(crate) second: usize,
     /// First derivatives.
-    pub gradient: [Vec3; PLACES],
+    pub(crate) gradient: [Vec3; PLACES],
     /// Derivatives with which tangents turn: the first derivatives or, where forces are unknowns of their own, the
     /// values of these.
-    pub carried: [Vec3; PLACES],
+    pub(crate) carried: [Vec3; PLACES],
     /// Second derivatives, i ≤ j; the other entries are not read.
-    pub hessian: [[Matrix3<f64>; PLACES]; PLACES],
+    pub(crate) hessian: [[Matrix3<f64>; PLACES]; PLACES],
 }
 
 /// A spring that is linear in the unknowns, between two points of the centre line.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Link {
     /// The elements of both points.
-    pub elements: [usize; 2],
+    pub(crate) elements: [usize; 2],
     /// Weights of the eight in the difference of the points, first minus second.
-    pub weights: [f64; PLACES],
+    pub(crate) weights: [f64; PLACES],
     /// First derivative in that difference.
-    pub gradient: Vec3,
+    pub(crate) gradient: Vec3,
     /// Second derivative in it.
-    pub hessian: Matrix3<f64>,
+    pub(crate) hessian: Matrix3<f64>,
 }
 
 /// Unknowns of a node on which a point depends: its position, and the rotation of its tangent along u and v.

@@ -11,22 +11,22 @@ use std::ops::{Add, Mul, Sub};
 
 /// One instrument in an element, sampled at its Gauss points, as far as its material angle needs it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Material {
+pub(crate) struct Material {
     /// Bending stiffness EI of this instrument alone, in the plane in which it bends most easily.
-    pub bending: [f64; 3],
+    pub(crate) bending: [f64; 3],
     /// What it is stiffer by in others, B = EI + (p c; c q) along d₁ and d₂: (p, q, c), 0 of round cross-sections.
-    pub skew: [[f64; 3]; 3],
+    pub(crate) skew: [[f64; 3]; 3],
     /// Torsional stiffness GJ; unused without twist.
-    pub torsion: [f64; 3],
+    pub(crate) torsion: [f64; 3],
     /// Rest curvature along d₁ and d₂.
-    pub rest_curvature: [[f64; 2]; 3],
+    pub(crate) rest_curvature: [[f64; 2]; 3],
     /// Rest twist per length.
-    pub rest_twist: [f64; 3],
+    pub(crate) rest_twist: [f64; 3],
 }
 
 impl Material {
     /// No instrument: it has ended before this element.
-    pub const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         bending: [0.0; 3],
         skew: [[0.0; 3]; 3],
         torsion: [0.0; 3],
@@ -43,17 +43,17 @@ impl Material {
 
 /// Data of an element, sampled at its Gauss points.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ElementData {
+pub(crate) struct ElementData {
     /// Length h along the rod.
-    pub length: f64,
+    pub(crate) length: f64,
     /// Total bending stiffness EI of all instruments, without what they are stiffer by in some planes.
-    pub bending: [f64; 3],
+    pub(crate) bending: [f64; 3],
     /// Axial flexibility ∫ds/EA; zero = inextensible.
-    pub flexibility: f64,
+    pub(crate) flexibility: f64,
     /// The instruments that have material angles, one per set of angles.
-    pub materials: [Material; MAX_ANGLES],
+    pub(crate) materials: [Material; MAX_ANGLES],
     /// Play of all of it in an instrument that ends at its first node, if there is any.
-    pub tilt: Option<Tilt>,
+    pub(crate) tilt: Option<Tilt>,
 }
 
 impl ElementData {
@@ -77,7 +77,7 @@ impl ElementData {
     }
 
     /// An inextensible element of one instrument.
-    pub fn of(length: f64, material: Material) -> Self {
+    pub(crate) fn of(length: f64, material: Material) -> Self {
         let mut data = Self { length, bending: material.bending, ..Self::EMPTY };
         data.materials[0] = material;
         data
@@ -124,28 +124,28 @@ impl ElementData {
 
 /// State of one element.
 #[derive(Debug, Clone, Copy)]
-pub struct ElementState {
+pub(crate) struct ElementState {
     /// Reference triad of the first node.
-    pub first: Frame,
+    pub(crate) first: Frame,
     /// Reference triad of the second node.
-    pub second: Frame,
+    pub(crate) second: Frame,
     /// Chord (x₁ − x₀)/h.
-    pub chord: Vec3,
+    pub(crate) chord: Vec3,
     /// Axial force.
-    pub tension: f64,
+    pub(crate) tension: f64,
     /// θ₀, θ₁ + reference twist, and b of each set of angles.
-    pub angles: [[f64; 3]; MAX_ANGLES],
+    pub(crate) angles: [[f64; 3]; MAX_ANGLES],
 }
 
 /// Stored energy by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Energy<T = f64> {
     /// Bending, ½∫(κ − κ⁰)ᵀB(κ − κ⁰) ds.
-    pub bend: T,
+    pub(crate) bend: T,
     /// Twist, ½∫GJ(τ − τ⁰)² ds.
-    pub twist: T,
+    pub(crate) twist: T,
     /// Stretch, ½∫EA ε² ds.
-    pub axial: T,
+    pub(crate) axial: T,
 }
 
 impl Energy {
@@ -217,13 +217,13 @@ pub(super) fn angles<S: Simd>(a: &[Lanes<S>; 3], p: &Point) -> (Lanes<S>, Lanes<
 #[derive(Debug, Clone)]
 pub(crate) struct ElementSystem<const C: usize, T = f64> {
     /// Gradient of the Lagrangian; the last entry is the constraint c − D N.
-    pub gradient: [T; C],
+    pub(crate) gradient: [T; C],
     /// Hessian, upper triangle; the last column is that of N.
-    pub rows: [[T; C]; C],
+    pub(crate) rows: [[T; C]; C],
     /// Derivative of the elongation c in the unknowns.
-    pub stretch: [T; C],
+    pub(crate) stretch: [T; C],
     /// Energies.
-    pub energy: Energy<T>,
+    pub(crate) energy: Energy<T>,
 }
 
 impl<const C: usize> ElementSystem<C> {

@@ -57,7 +57,7 @@ pub(crate) struct Side {
 
 /// The play of what goes on in an instrument that ends at the first node of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tilt {
+pub(crate) struct Tilt {
     /// δ.
     clearance: f64,
     /// EIᵣ.

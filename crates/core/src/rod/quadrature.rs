@@ -13,17 +13,17 @@ use std::ops::{Add, Mul};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Point {
     /// Position in the element, 0 to 1.
-    pub xi: f64,
+    pub(crate) xi: f64,
     /// Quadrature weight; the weights sum to 1.
-    pub weight: f64,
+    pub(crate) weight: f64,
     /// Weights in y = r′.
-    pub y: [f64; 3],
+    pub(crate) y: [f64; 3],
     /// Weights in z = h r″.
-    pub z: [f64; 3],
+    pub(crate) z: [f64; 3],
     /// Weights of (θ₀, θ₁, b) in the angle φ.
-    pub phi: [f64; 3],
+    pub(crate) phi: [f64; 3],
     /// Weights of (θ₀, θ₁, b) in h φ′.
-    pub dphi: [f64; 3],
+    pub(crate) dphi: [f64; 3],
 }
 
 impl Point {

@@ -17,29 +17,30 @@ pub struct RodState {
     /// Node triads. `t` is the tangent of the rod; angles are measured from `u` and `v`.
     pub frames: Vec<Frame>,
     /// Chords (x₁ − x₀)/h of the elements.
-    pub chords: Vec<Vec3>,
+    pub(crate) chords: Vec<Vec3>,
     /// Axial forces of the elements.
     pub tensions: Vec<f64>,
     /// Angles of the material triads against the reference triad at the nodes: node by node, and within a node set by
     /// set.
     pub angles: Vec<f64>,
     /// Angle bubbles of the elements, in the same order: the angle at the middle minus the mean of the ends.
-    pub bubbles: Vec<f64>,
+    pub(crate) bubbles: Vec<f64>,
     /// Reference twist of the elements, followed continuously over full turns.
-    pub reference_twists: Vec<f64>,
+    pub(crate) reference_twists: Vec<f64>,
     /// Node positions; they follow from the first one and the chords.
     pub positions: Vec<Vec3>,
 }
 
 impl RodState {
     /// A straight rod from `start` along `frame.t`, untwisted.
-    pub fn straight(elements: &[ElementData], start: Vec3, frame: Frame) -> Self {
+    #[cfg(test)]
+    pub(crate) fn straight(elements: &[ElementData], start: Vec3, frame: Frame) -> Self {
         Self::from_frames(elements, start, vec![frame; elements.len() + 1])
     }
 
     /// A rod with the given node tangents: the middle slopes are halfway between them, all angles are zero. The reference
     /// triads are carried along the rod from the first by smallest rotations.
-    pub fn from_frames(elements: &[ElementData], start: Vec3, mut frames: Vec<Frame>) -> Self {
+    pub(crate) fn from_frames(elements: &[ElementData], start: Vec3, mut frames: Vec<Frame>) -> Self {
         let n = elements.len();
         let mut chords = Vec::with_capacity(n);
         for e in 0..n {
@@ -82,7 +83,7 @@ impl RodState {
 
     /// State of element `e`, where two neighbouring nodes have `C` unknowns.
     #[inline]
-    pub fn element<const C: usize>(&self, e: usize) -> ElementState {
+    pub(crate) fn element<const C: usize>(&self, e: usize) -> ElementState {
         ElementState {
             first: self.frames[e],
             second: self.frames[e + 1],
@@ -198,7 +199,7 @@ impl RodState {
     }
 
     /// Copies another state of the same size without allocating.
-    pub fn copy_from(&mut self, other: &Self) {
+    pub(crate) fn copy_from(&mut self, other: &Self) {
         self.frames.clone_from(&other.frames);
         self.chords.clone_from(&other.chords);
         self.tensions.clone_from(&other.tensions);

@@ -19,7 +19,7 @@ const SUPPORT_FLEXIBILITY: f64 = 1e-12;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Supports {
     /// The first node is as free as any other.
-    pub start_free: bool,
+    pub(crate) start_free: bool,
     /// The first node's tangent is held.
     pub start_tangent: bool,
     /// Whether the first node's angle of each set is held.
@@ -31,25 +31,25 @@ pub struct Supports {
     /// Tangent of the last node, if held.
     pub end_tangent: Option<Vec3>,
     /// First material direction d₁ of the last node and the angle it is held at, if held.
-    pub end_angle: Option<EndAngle>,
+    pub(crate) end_angle: Option<EndAngle>,
     /// Multipliers: along the directions, about u and v of the end triad, about the tangent.
-    pub multipliers: [f64; 6],
+    pub(crate) multipliers: [f64; 6],
 }
 
 /// A held end angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EndAngle {
+pub(crate) struct EndAngle {
     /// Direction d₁ at zero `turns`, across the end tangent.
-    pub normal: Vec3,
+    pub(crate) normal: Vec3,
     /// Further rotation about the tangent, any number of turns.
-    pub turns: f64,
+    pub(crate) turns: f64,
     /// The target angle against the current reference triad, whole turns included.
-    pub target: f64,
+    pub(crate) target: f64,
 }
 
 impl Supports {
     /// Number of conditions at the last node.
-    pub fn conditions(&self) -> usize {
+    pub(crate) fn conditions(&self) -> usize {
         self.end_directions.len()
             + 2 * usize::from(self.end_tangent.is_some())
             + usize::from(self.end_angle.is_some())
@@ -82,7 +82,7 @@ impl Supports {
     }
 
     /// Chooses the branch of the end angle for an initial shape: the one nearest to `turns` beyond an untwisted rod.
-    pub fn begin(&mut self, state: &RodState) {
+    pub(crate) fn begin(&mut self, state: &RodState) {
         let n = state.elements();
         let untwisted = state.angles[0] - state.reference_twists.iter().sum::<f64>();
         if let Some(end) = &mut self.end_angle {
@@ -154,7 +154,7 @@ impl Supports {
     }
 
     /// Rows of the first node's unknowns that are held.
-    pub fn held<const C: usize>(&self) -> [Option<usize>; 5 + MAX_ANGLES] {
+    pub(crate) fn held<const C: usize>(&self) -> [Option<usize>; 5 + MAX_ANGLES] {
         let l = Layout::<C>;
         let mut held = [None; 5 + MAX_ANGLES];
         if self.start_free {

@@ -21,6 +21,25 @@ use crate::vessel::{
 use crate::{Error, Result};
 
 /// A scene whose `[method]` is one of this crate's: the exact rod.
+///
+/// ```
+/// # #[cfg(feature = "scene-files")] {
+/// use endowire_core::{NoStore, Scene};
+///
+/// let text = r#"
+///     vessel.tree = "curved_tube.csv"
+///     sheath.opening = 0
+///     [device]
+///     section = [{ length_mm = 300.0, radius_mm = 0.45, bending_stiffness_nmm2 = 10.0 }]
+/// "#;
+/// // A file of this text beside the vessel's; `Scene::read` reads it from disk.
+/// let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/vessels/scene.toml");
+/// let mut simulation = Scene::from_toml(text, path.as_ref())?.simulation(&NoStore)?;
+/// simulation.step(endowire_core::Command::advance(5.0))?;
+/// assert_eq!(simulation.report().inserted_mm, 5.0);
+/// # }
+/// # Ok::<(), endowire_core::Error>(())
+/// ```
 pub type Scene = SceneOf<OwnMethod>;
 
 /// The contents of a scene file, with the folder to which its paths are relative. `M` is the type of its `[method]`.

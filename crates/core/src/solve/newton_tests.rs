@@ -1,6 +1,7 @@
 //! The solver alone on cantilevers.
 
-use super::{External, Newton, NewtonOptions, NewtonReport, StepRecord};
+use super::report::StepRecord;
+use super::{External, Newton, NewtonOptions, NewtonReport};
 use crate::Vec3;
 use crate::rod::{ElementData, Frame, PLAIN, PointSum, RodState, Stencils, Supports};
 

@@ -62,7 +62,7 @@ pub struct Instrument {
     #[serde(default)]
     pub hand: f64,
     /// Play to either side in the next instrument of the list, which then goes from the innermost outwards; 0 for none.
-    /// See [`crate::rod::Tilt`].
+    /// See `rod/play.rs`.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub clearance: f64,
     /// Sections in order from its tip, with `until` measured from the tip; the last one ends no nearer than

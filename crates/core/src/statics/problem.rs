@@ -178,7 +178,7 @@ impl StaticProblem {
     }
 
     /// The same in fields, whose units of length and energy are those of the case. They act in full in all load steps, and are no part of the energies of the
-    /// solution.
+    /// solution. Push forces of several instruments have what fields do to the line, without what they bring to material that comes in.
     ///
     /// # Errors
     /// See [`StaticProblem::solve_state`].

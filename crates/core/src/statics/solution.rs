@@ -111,7 +111,7 @@ pub struct StaticSolution {
     /// Reactions.
     pub reactions: Reactions,
     /// Force that holds the rod in place if the clamp at its start is a frictionless sleeve it can slide through;
-    /// `None` if the start is not clamped. See [`Clamp::push_force`](crate::rod::Clamp::push_force).
+    /// `None` if the start is not clamped. See [`Clamp::push_force`](super::Clamp::push_force).
     pub push_force: Option<f64>,
     /// Self-contacts, in order along the rod; omitted if there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]

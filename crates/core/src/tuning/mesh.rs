@@ -1,6 +1,6 @@
 //! Numbers of a device's mesh.
 
-/// Where elements and contact points of a device are ([`crate::methods::kirchhoff::Mesh`]).
+/// Where elements and contact points of a device are (`methods/kirchhoff/mesh.rs`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshTuning {
     /// Largest angle by which the rest shape bends in an element, rad.

@@ -1,6 +1,6 @@
 //! Numbers of Newton's method.
 
-/// How Newton's method takes steps, and when it stops ([`crate::solve`]).
+/// How Newton's method takes steps, and when it stops (`solve`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewtonTuning {
     /// Largest rotation of a node in one step, rad. Slightly less than a right angle is best: a dead load across a

@@ -18,6 +18,16 @@ const FLAT: f64 = 1e-14;
 const MOST_OPENINGS: usize = 10_000;
 
 /// A vessel wall: triangles counter-clockwise seen from outside the lumen, with numbered openings.
+///
+/// ```
+/// use endowire_core::{SurfaceMesh, Vec3, Wall};
+///
+/// // Read one from a file with `SurfaceMesh::read(path, unit_mm)`. A box 10 mm wide:
+/// let surface = SurfaceMesh::cuboid(Vec3::zeros(), Vec3::new(10.0, 10.0, 100.0), 5.0);
+/// let wall = Wall::from_surface(&surface)?;
+/// assert!((wall.volume_mm3() - 10_000.0).abs() < 1e-6);
+/// # Ok::<(), endowire_core::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Wall {
     pub(super) mesh: SurfaceMesh,

@@ -44,9 +44,8 @@ fn tick(course: &mut Course, moves: &[Move], solves: usize) {
 
 /// Courses in which ticks are not steps, or end elsewhere than small steps without a reported jump.
 pub(super) fn ticks(repository: &Path, only: Option<&str>, say: &mut dyn FnMut(String)) -> Result<usize> {
-    say(format!(
-        "device             friction  ticks = steps  apart mm: steps  few solves  jumps: steps  ticks  few  small"
-    ));
+    say("device             friction  ticks = steps  apart mm: steps  few solves  jumps: steps  ticks  few  small"
+        .to_owned());
     let mut wrong = 0;
     for device in DEVICES.iter().filter(|name| only.is_none_or(|only| name.contains(only))) {
         for friction in FRICTIONS {

@@ -19,11 +19,11 @@ use crate::{Result, Vec3, parallel};
 #[derive(Debug, Clone)]
 pub struct ContactMesh {
     /// Its smooth distance.
-    pub smooth: SmoothWall,
+    pub(crate) smooth: SmoothWall,
     /// Nearest triangles and clearances.
     pub query: WallQuery,
     /// Modulus and friction, where they are not the same everywhere.
-    pub regions: Option<RegionMap>,
+    pub(crate) regions: Option<RegionMap>,
     /// Reach of the queries of the device's points, mm.
     pub(in crate::contact) reach_mm: f64,
     /// Where the lumen is narrow.

@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 
 use super::*;
-use crate::contact::{ContactSurface, Hint, WallPotential, WallProperties};
+use crate::contact::surface::Hint;
+use crate::contact::{ContactSurface, WallPotential, WallProperties};
 use crate::rod::Frame;
 use crate::tuning::ContactTuning;
 use crate::vessel::{NoStore, SurfaceMesh, Wall};

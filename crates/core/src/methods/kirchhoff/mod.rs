@@ -1,6 +1,6 @@
 //! This crate's method: the exact rod in equilibrium with the wall, after every command.
 //!
-//! The inserted length is a Kirchhoff rod ([`crate::rod`]) clamped in the sheath's mouth and free at its tip, in the
+//! The inserted length is a Kirchhoff rod (`rod`) clamped in the sheath's mouth and free at its tip, in the
 //! energy of the wall ([`crate::contact`]). Outside lies its tail, which twists between hand and mouth (`tail.rs`). A command
 //! changes the inserted length and rotates the end of the tail; the rod
 //! slides along its own curve and Newton's method takes it from there to the nearest minimum of the potential energy.
@@ -12,7 +12,7 @@
 //! ```
 //!
 //! of which the second term is configurational: the energy that the next piece stores as it leaves the
-//! straight sheath ([`push_force`](crate::rod::Clamp::push_force)). Its twist it had before. F is the derivative of the stored energy with
+//! straight sheath ([`Clamp::push_force`](crate::statics::Clamp::push_force)). Its twist it had before. F is the derivative of the stored energy with
 //! respect to the inserted length.
 //!
 //! # The algorithm of a step

@@ -90,6 +90,15 @@ impl Resolution {
 }
 
 /// A wall made from a centre-line tree.
+///
+/// ```
+/// use endowire_core::{GeneratedWall, Resolution, anatomy};
+///
+/// let tree = anatomy::tree("aortic_arch").expect("a built-in anatomy");
+/// let vessel = GeneratedWall::new(&tree, Resolution::EdgeMm(4.0))?;
+/// assert_eq!(vessel.ends.len(), vessel.wall.openings().len());
+/// # Ok::<(), endowire_core::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct GeneratedWall {
     /// The wall, open at the root and at every leaf that is not closed.
