@@ -76,7 +76,7 @@ pub(crate) enum DeviceCommand {
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(crate) struct CoordinateArgs {
     /// Millimetres per unit of the file
-    #[arg(long, default_value_t = 1.0, value_name = "MM")]
+    #[arg(long, default_value_t = 1.0, value_name = "MM", value_parser = parse_above_zero)]
     pub(crate) unit_mm: f64,
     /// Axes of the file, LPS or RAS; if absent, those of its header, or LPS
     #[arg(long, value_name = "AXES")]
@@ -247,6 +247,14 @@ pub(crate) struct StraightenArgs {
 fn parse_place(text: &str) -> Result<Vec3, String> {
     match parse_end(text) {
         Ok(CentrelineEnd::Place(place_mm)) => Ok(place_mm),
+        Err(far) if text.split(',').count() == 3 => Err(far),
         _ => Err("expected a place x,y,z in mm".to_owned()),
     }
+}
+
+/// Parses a number above 0.
+pub(super) fn parse_above_zero(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| "expected a number".to_owned())?;
+    let is_right = number.is_finite() && number > 0.0;
+    is_right.then_some(number).ok_or_else(|| "must be a finite number above 0".to_owned())
 }
