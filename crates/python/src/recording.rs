@@ -321,7 +321,7 @@ impl Recorder {
         slf
     }
 
-    /// As `close`; an exception that ends the `with` statement is told in the summary as what has ended the recording.
+    /// As `close`; an exception that ends the `with` statement is reported in the summary as what has ended the recording.
     #[pyo3(signature = (kind=None, raised=None, trace=None))]
     fn __exit__(
         &self,

@@ -92,7 +92,7 @@ impl From<CoordinateArgs> for SurfaceFrame {
 /// What of a surface is repaired, as `vessel.repair` and `vessel.keep_open_mm` of a scene say.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(crate) struct RepairArgs {
-    /// all: faults are mended; none: the surface is taken as it is, or refused
+    /// all: faults are repaired; none: the surface is taken as it is, or refused
     #[arg(long, value_name = "all|none", default_value = "all")]
     pub(crate) repair: RepairMode,
     /// A place x,y,z in mm: the hole nearest to it is meant, and is not closed (repeatable)
