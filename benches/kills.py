@@ -24,8 +24,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE = ROOT / "assets" / "scenes" / "curved_tube_exact.toml"
-#: The same for all, of the coarser elements that are fast enough to be killed often.
-SET = {"method.element_mm": "4.0", "script": "[{ advance_mm = 120.0, step_mm = 0.4 }]", "view.views": "[]"}
+#: Elements that are fast enough to be killed often.
+COARSE = {"method.element_mm": "4.0"}
 DATASET = f"""
 seed = 7
 scenes = ["{SCENE}"]
@@ -169,8 +169,10 @@ def main() -> None:
             return outer / name
 
         folder = place("runs")
-        pictures = settings({**SET, "view.views": '["fluoro"]', "view.every": "10", "view.size_px": "[64, 64]"})
-        run = [program, "run", str(SCENE), *pictures, "--out", "out", "--quiet", "--save-state", "state", "--resume", "state"]
+        script = {"script": "[{ advance_mm = 120.0, step_mm = 0.4 }]"}
+        pictures = {"view.views": '["fluoro"]', "view.every": "10", "view.size_px": "[64, 64]"}
+        given = settings({**COARSE, **script, **pictures})
+        run = [program, "run", str(SCENE), *given, "--out", "out", "--quiet", "--save-state", "state", "--resume", "state"]
         check("runs", run, folder, args.tries, draw, whole)
 
         folder = place("datasets")
@@ -185,7 +187,7 @@ def main() -> None:
         folder = place("sessions")
         lines = [{"do": "move", "mm_per_s": 8.0, "deg_per_s": 0.0}] + [{"do": "wait", "ticks": 60}] * 300
         (outer / "inputs.jsonl").write_text("\n".join(json.dumps(line) for line in lines) + "\n")
-        play = [program, "play", str(SCENE), *settings(SET), "--headless", "--inputs", "../../inputs.jsonl", "--record", "out/played.toml", "--size", "64"]
+        play = [program, "play", str(SCENE), *settings(COARSE), "--headless", "--inputs", "../../inputs.jsonl", "--record", "out/played.toml", "--size", "64"]
         check("sessions", play, folder, max(1, args.tries // 3), draw, whole)
 
         if args.python:

@@ -7,7 +7,7 @@
 //! A straight tube continues into a bend. A frictionless wire lies along its outer side, and is pushed with
 //! EI/2/(R + play)². A row for each radius of the device, in percent of the lumen's, modulus of the wall and length of
 //! edges, in radii of the lumen (0: the centre line): the push force over that, least, mean and largest; the largest
-//! deviation of the energy from a line over small steps, relative; told depth over that of the geometry, least and
+//! deviation of the energy from a line over small steps, relative; reported depth over that of the geometry, least and
 //! largest of the pressed places; iterations a step, steps that did not converge, time.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a table is what it is for")]
 
@@ -36,7 +36,7 @@ const EDGES: [f64; 4] = [0.0, 0.1, 0.2, 0.4];
 const INTO: (usize, f64) = (12, 2.0);
 const MEASURED: (usize, f64) = (15, 1.0);
 const SMALL: (usize, f64) = (20, 0.025);
-/// Depth from which told depths count, in parts of the largest.
+/// Depth from which reported depths count, in parts of the largest.
 const PRESSED: f64 = 0.3;
 
 /// Axis of the tube.

@@ -44,7 +44,7 @@ pub struct Hand {
     /// it was not recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_mm: Option<Vec3>,
-    /// Material position of that tip, in the vessel at rest; `None` if the vessel does not move, or if it was not
+    /// Material position of that tip, in the undisplaced vessel; `None` if the vessel does not move, or if it was not
     /// recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_at_rest_mm: Option<Vec3>,
@@ -68,7 +68,7 @@ pub struct Sample {
     pub time_s: f64,
     /// Position of the foremost tip; `None` while nothing is inserted.
     pub tip_mm: Option<Vec3>,
-    /// Material position of that tip, in the vessel at rest; `None` if the vessel does not move, or if it was not
+    /// Material position of that tip, in the undisplaced vessel; `None` if the vessel does not move, or if it was not
     /// recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_at_rest_mm: Option<Vec3>,
@@ -105,7 +105,7 @@ fn is_zero(number: &f64) -> bool {
 }
 
 impl Sample {
-    /// Position of the tip to be compared with the centre line, which belongs to the vessel at rest.
+    /// Position of the tip to be compared with the centre line, which belongs to the undisplaced vessel.
     pub(crate) fn on_centreline_mm(&self) -> Option<Vec3> {
         self.tip_at_rest_mm.or(self.tip_mm)
     }

@@ -43,7 +43,7 @@ pub struct Subject {
     /// Limits that end it early.
     #[serde(default)]
     pub limits: Limits,
-    /// Whether it is an exam: the 3D view is hidden, nothing can be undone, and hardly anything may be moved unseen.
+    /// Whether it is an exam: the 3D view is hidden, nothing can be undone, and almost nothing may be moved unseen.
     #[serde(default)]
     pub exam: bool,
     /// Thresholds of measures. An exam adds those that count in every subject.

@@ -166,7 +166,7 @@ pub(crate) unsafe fn free<T>(pointer: *mut T) {
     if !pointer.is_null() {
         // SAFETY: it is the address of a box that nobody has freed, the caller promises.
         let owned = unsafe { Box::from_raw(pointer) };
-        // A panic here has nobody to be told to, and nothing is left to be used.
+        // A panic here cannot be reported to anybody, and nothing is left to be used.
         let _ = catch_unwind(AssertUnwindSafe(|| drop(owned)));
     }
 }

@@ -33,7 +33,7 @@ pub(crate) fn main() -> Result<()> {
     let mut simulation = Simulation::builder(vessel.wall, wire, sheath).build()?;
     simulation.step(Command::advance(40.0))?;
     simulation.set_fields([Arc::new(Pulled(1e-4)) as Arc<dyn Field>])?;
-    simulation.step(Command::default())?; // hands at rest: the wire follows the field
+    simulation.step(Command::default())?; // hands still: the wire follows the field
     println!("tip at {:?} mm, {:?}", simulation.shape().tip_mm(), simulation.report().energy);
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! D8: the effect of clearance between instruments, which the shared line neglects unless it is told of play.
+//! D8: the effect of clearance between instruments, which the shared line neglects unless it is given play.
 //!
 //! Here a wire and a catheter are two beams with small deflections w₁ and w₂, held together at the sheath and kept
 //! within the clearance δ of each other where both are, |w₁ − w₂| ≤ δ; the wire continues beyond the catheter's tip.

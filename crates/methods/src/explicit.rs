@@ -30,7 +30,7 @@ pub(crate) struct Integration {
 }
 
 impl Integration {
-    /// Starts at rest. `axial_ratio` is EA h²/EI of axial springs, `time_step` is relative to the largest stable one,
+    /// Starts still. `axial_ratio` is EA h²/EI of axial springs, `time_step` is relative to the largest stable one,
     /// `damping` to the critical one, `tolerance` as in [`RodModel::relax`](crate::RodModel::relax).
     pub(crate) fn new(chain: &Chain, axial_ratio: f64, time_step: f64, damping: f64, tolerance: f64) -> Self {
         let n = chain.segments();

@@ -310,7 +310,7 @@ impl Keys {
     }
 
     /// Steers what is in the hand. Others than steered instruments are asked only if one is selected and a key asks, so
-    /// that its user is told why nothing bends.
+    /// that its user learns why nothing bends.
     fn steer(&self, to: Option<f64>, per_s: f64, by_key: bool) -> Vec<Input> {
         let each = self.hands().filter(|(index, _)| self.steered[*index] || by_key && self.chosen.is_some());
         let per_s = to.map(|_| per_s);

@@ -268,7 +268,7 @@ impl Lab {
         Ok(())
     }
 
-    /// Injects `ml` from `time_s` on, at `at_mm` in the vessel at rest with this wall; returns the injection.
+    /// Injects `ml` from `time_s` on, at `at_mm` in the undisplaced vessel with this wall; returns the injection.
     pub(crate) fn inject(
         &mut self,
         wall: &Wall,

@@ -18,7 +18,7 @@ pub const PAD: &[(&str, &str)] = &[
     ("select, start", "next instrument, fluoroscopy on or off"),
 ];
 
-/// Deflection below which a stick is at rest: worn sticks do not return to the centre.
+/// Deflection below which a stick is in its centre: worn sticks do not return to the centre.
 const DEAD_ZONE: f64 = 0.15;
 
 /// A button, by its position: labels differ between makers.
@@ -83,7 +83,7 @@ impl Button {
     }
 }
 
-/// State of a gamepad; at rest if none is connected.
+/// State of a gamepad; untouched if none is connected.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Pad {
     /// Deflection of the left stick upwards, −1 to 1.

@@ -1,24 +1,25 @@
 //! The session: inputs and ticks go in, readouts and snapshots come out.
 
+mod apply;
 mod exam;
 mod idle;
+mod snapshot;
 
-use endowire_assess::{Exam, Injection, Outlet};
-use endowire_core::insertion::{Command, DetachedCoil, InstrumentReport, Packing, Script, Simulation};
-use endowire_core::shape::Shape;
-use endowire_core::vessel::{Displacement, NoStore, Sac};
+use endowire_assess::Exam;
+use endowire_core::insertion::{InstrumentReport, Packing, Script, Simulation};
+use endowire_core::vessel::{NoStore, Sac};
 use endowire_core::{Error, PhysicalEnd, Result};
-use endowire_viewer::{ContactView, FrameTime, ViewSpec};
+use endowire_viewer::ViewSpec;
+pub use snapshot::Snapshot;
 
 use crate::TICKS_PER_S;
 use crate::demonstration::{Demonstration, Next};
 use crate::hand::{Hand, Motion, steered};
-use crate::history::{Done, History, Injected, moves_by_itself};
+use crate::history::{Done, History, moves_by_itself};
 use crate::input::Input;
 use crate::lab::Lab;
-use crate::lumens::lumens;
 use crate::meter::Meter;
-use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
+use crate::readout::{Event, EventKind, Limits, Went};
 use crate::replay::Inputs;
 use crate::telemetry::Telemetry;
 
@@ -72,34 +73,6 @@ pub struct Session {
     meter: Meter,
     /// All inputs, each with the number of ticks before it.
     inputs: Vec<(u64, Input)>,
-}
-
-/// Data for drawing one frame.
-#[derive(Debug, Clone)]
-pub struct Snapshot {
-    /// The line of all instruments.
-    pub shape: Shape,
-    /// Inserted length of each instrument, mm.
-    pub inserted_mm: Vec<f64>,
-    /// Contacts with the wall.
-    pub contacts: Vec<ContactView>,
-    /// Displacement of the vessel; `None` if it never moves.
-    pub displacement: Option<Displacement>,
-    /// Detached coils.
-    pub coils: Vec<DetachedCoil>,
-    /// The cath lab.
-    pub lab: Lab,
-    /// Number and time of the frame.
-    pub moment: FrameTime,
-    /// The readout.
-    pub readout: Readout,
-}
-
-impl Snapshot {
-    /// Whether the 3D view is hidden: in an exam, until it has ended.
-    pub fn hides_three_d(&self) -> bool {
-        self.readout.subject.as_ref().is_some_and(|one| one.task.exam && one.verdict.is_none())
-    }
 }
 
 impl std::fmt::Debug for Session {
@@ -194,178 +167,6 @@ impl Session {
         !before && packing.is_some_and(|packing| packing.herniated)
     }
 
-    /// Applies an input. A refused input becomes an event and changes nothing else.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] for a value that is out of range or a name that does not exist.
-    pub fn apply(&mut self, input: &Input) -> Result<()> {
-        self.inputs.push((self.ticks, input.clone()));
-        let done = self.check_in_exam(input).and_then(|()| self.carry_out(input));
-        if let Err(error) = &done {
-            self.happened(kind_of(error), error.to_string());
-        }
-        done
-    }
-
-    fn carry_out(&mut self, input: &Input) -> Result<()> {
-        match input {
-            Input::Select { instrument } => self.selected = self.simulation.stack().find(instrument)?,
-            Input::Move { instrument, mm_per_s, deg_per_s } => {
-                let index = self.index(instrument.as_deref())?;
-                self.hands[index].hold(*mm_per_s, *deg_per_s)?;
-                if *mm_per_s != 0.0 || *deg_per_s != 0.0 {
-                    self.take_over();
-                }
-            }
-            Input::Nudge { instrument, mm, deg } => {
-                let index = self.index(instrument.as_deref())?;
-                self.hands[index].nudge(*mm, *deg)?;
-                self.take_over();
-            }
-            Input::Steer { instrument, to, per_s } => {
-                let index = self.index(instrument.as_deref())?;
-                self.check_steered(index, *to)?;
-                self.hands[index].steer(*to, *per_s)?;
-                if to.is_some() {
-                    self.take_over();
-                }
-            }
-            Input::Stop {} => {
-                self.stop();
-                self.demonstration.iter_mut().for_each(|shown| shown.paused = true);
-            }
-            Input::Script {} => self.demonstrate()?,
-            Input::Pedal { down, mode } => self.lab.pedal(*down, *mode)?,
-            Input::Inject { ml, ml_per_s } => self.inject(self.injects_through(), *ml, *ml_per_s)?,
-            Input::Detach { instrument } => self.detach(self.index(instrument.as_deref())?)?,
-            Input::CArm { pose } => self.lab.pose(*pose)?,
-            Input::TurnCArm { lao_deg, cra_deg } => self.lab.turn_c_arm([*lao_deg, *cra_deg])?,
-            Input::Table { right_mm, down_mm, second } => {
-                self.lab.table([*right_mm, *down_mm], *second)?;
-            }
-            Input::Zoom { factor } => self.lab.zoom(*factor)?,
-            Input::Collimate { width, height } => self.lab.collimate([*width, *height])?,
-            Input::TurnCamera { azimuth_deg, elevation_deg } => {
-                self.lab.turn_camera([*azimuth_deg, *elevation_deg])?;
-            }
-            Input::ZoomCamera { factor } => self.lab.zoom_camera(*factor)?,
-            Input::MoveCamera { right, up } => self.lab.move_camera([*right, *up])?,
-            Input::Undo {} => self.go_to(self.history.last_motion())?,
-            Input::Redo {} => self.go_to(self.history.next_motion())?,
-            Input::GoTo { step } => {
-                let steps = self.history.steps();
-                if *step > steps {
-                    return Err(Error::parameter("step", step, format!("{steps} steps were carried out")));
-                }
-                self.go_to(*step)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Refuses to steer an instrument that has nothing to be steered.
-    fn check_steered(&self, index: usize, to: Option<f64>) -> Result<()> {
-        let instrument = &self.simulation.stack().instruments()[index];
-        match to {
-            Some(to) if !instrument.device.is_steerable() => {
-                let name = &instrument.name;
-                let remedy =
-                    format!("{name:?} is not steered: give a section of it steer, or select another");
-                Err(Error::parameter("steer", to, remedy))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn stop(&mut self) {
-        self.hands.iter_mut().for_each(|hand| *hand = Hand::default());
-    }
-
-    /// Starts the script, or continues it.
-    fn demonstrate(&mut self) -> Result<()> {
-        if let Some(shown) = &mut self.demonstration {
-            shown.paused = false;
-            return Ok(());
-        }
-        let steps = self.history.steps();
-        let Some(script) = self.script.clone().filter(|script| !script.is_empty()) else {
-            let remedy = "there is none to show: give [[script]] in the scene";
-            return Err(Error::parameter("script", "none", remedy));
-        };
-        if steps > 0 {
-            let remedy = "it begins where the scene does: go back to step 0 first";
-            return Err(Error::parameter("script", format!("step {steps}"), remedy));
-        }
-        self.stop();
-        self.demonstration = Some(Demonstration::new(script));
-        Ok(())
-    }
-
-    /// Detaches the coil of an instrument, as a motion.
-    fn detach(&mut self, instrument: usize) -> Result<()> {
-        self.take_over();
-        self.stop();
-        // The check uses a copy in which the device has caught up, so that a refusal changes nothing.
-        let mut followed = self.simulation.clone();
-        if followed.report().is_under_way() {
-            followed.step(Command::default())?;
-        }
-        followed.check_detach(instrument)?;
-        self.catch_up()?;
-        self.advance(Done { detach: Some(instrument), ..Self::resting() }, true)
-    }
-
-    /// A step without motion.
-    fn resting() -> Done {
-        Done { motions: vec![], per_s: TICKS_PER_S, detach: None, solves: None }
-    }
-
-    /// Lets the device catch up with its commanded motion and come to rest.
-    fn catch_up(&mut self) -> Result<()> {
-        if self.simulation.report().is_under_way() { self.advance(Self::resting(), false) } else { Ok(()) }
-    }
-
-    /// Ends a script that is being played, because the operator moves an instrument.
-    fn take_over(&mut self) {
-        if self.demonstration.take().is_some() {
-            self.happened(EventKind::Script, "the script ends here: a hand has taken over".to_owned());
-        }
-    }
-
-    /// Goes to the state after a step, backwards or forwards. Contrast medium of undone steps is removed; that of
-    /// redone steps flows from now on.
-    fn go_to(&mut self, step: usize) -> Result<()> {
-        self.stop();
-        self.demonstration = None;
-        self.moving = false;
-        self.holds_still = true;
-        let before = self.history.steps();
-        self.history.go_to(step, &mut self.simulation)?;
-        self.pack();
-        self.telemetry.go_elsewhere();
-        let again = self.history.inject_again(before, self.time_s());
-        self.lab.flow_again(self.history.undone_injections().map(|one| &one.flow), again)
-    }
-
-    /// Injects through an instrument, or through the sheath if there is none or it is not inserted. Pictures, script and
-    /// record all take the place where the medium leaves from its [`Outlet`].
-    fn inject(&mut self, instrument: Option<usize>, ml: f64, ml_per_s: f64) -> Result<()> {
-        let outlet = Outlet::of(&self.simulation, instrument);
-        let instrument = instrument.filter(|_| outlet.instrument.is_some());
-        let time_s = self.time_s();
-        let wall = self.simulation.lumen().wall(&NoStore)?;
-        let flow = self.lab.inject(wall, (ml, ml_per_s), outlet.at_mm, time_s)?;
-        let after_step = self.history.steps();
-        self.history.inject(Injected { instrument, ml, ml_per_s, after_step, flow });
-        let (volume_ml, rate_ml_per_s) = (ml, ml_per_s);
-        self.telemetry.inject(Injection { time_s, volume_ml, rate_ml_per_s, outlet: Some(outlet) });
-        Ok(())
-    }
-
-    fn index(&self, instrument: Option<&str>) -> Result<usize> {
-        instrument.map_or(Ok(self.selected), |name| self.simulation.stack().find(name))
-    }
-
     /// Advances by 1/60 s. Instruments that move carry out one step; a script that is played carries out the steps
     /// that end in this tick.
     pub fn tick(&mut self) {
@@ -406,6 +207,11 @@ impl Session {
         self.moving = false;
         self.note(self.time_s(), &[]);
         self.examine();
+    }
+
+    /// A step without motion.
+    fn resting() -> Done {
+        Done { motions: vec![], per_s: TICKS_PER_S, detach: None, solves: None }
     }
 
     /// Commanded inserted length of each instrument, mm; the device may not have followed yet.
@@ -530,6 +336,15 @@ impl Session {
         Ok(())
     }
 
+    fn beyond(&self, report: &InstrumentReport) -> bool {
+        report.push_force_n.is_some_and(|force| force.abs() > self.limits.push_n)
+            || report.torque_nmm.abs() > self.limits.torque_nmm
+    }
+
+    fn warns(&self) -> bool {
+        self.simulation.report().hands().iter().any(|report| self.beyond(report))
+    }
+
     /// Records an event, unless it equals the last one at the same step.
     fn happened(&mut self, kind: EventKind, text: String) {
         let step = self.history.steps();
@@ -586,107 +401,8 @@ impl Session {
         &self.simulation
     }
 
-    /// Contrast medium that hands have injected so far, ml.
-    fn contrast_ml(&self) -> f64 {
-        let by_s = self.time_s();
-        self.telemetry.record().injections.iter().map(|one| one.flowed_ml(by_s)).sum::<f64>() + 0.0
-    }
-
     /// All motions and injections as `[[script]]` tables of a scene file, which repeat them to the bit.
     pub fn script(&self) -> String {
         self.history.script(&self.simulation)
-    }
-
-    /// Data for drawing the current state.
-    pub fn snapshot(&self) -> Snapshot {
-        let report = self.simulation.report();
-        let contact = |c: &endowire_core::insertion::Contact| ContactView {
-            position_mm: c.position_mm,
-            force_n: c.total_n(),
-        };
-        let frame = self.ticks * self.lab.fluoro().frames_per_s as u64 / TICKS_PER_S as u64;
-        Snapshot {
-            shape: self.simulation.shape().clone(),
-            inserted_mm: report.lengths_mm(),
-            contacts: report.contacts.iter().map(contact).collect(),
-            displacement: self.simulation.displacement(),
-            coils: self.simulation.coils().to_vec(),
-            lab: self.lab.clone(),
-            moment: FrameTime { frame, time_s: self.time_s() },
-            readout: self.readout(),
-        }
-    }
-
-    /// The readout.
-    pub fn readout(&self) -> Readout {
-        let report = self.simulation.report();
-        let spec = self.lab.fluoro();
-        Readout {
-            step: self.history.steps(),
-            went: self.history.went(),
-            time_s: self.time_s(),
-            demonstrates: self.demonstrates(),
-            selected: self.simulation.stack().instruments()[self.selected].name.clone(),
-            instruments: self.instruments(),
-            tip_mm: self.simulation.shape().tip_mm().map(Into::into),
-            contacts: report.contacts.len(),
-            wall_force_n: self.telemetry.record().wall_forces_n(&self.simulation)[0],
-            lab: LabReadout {
-                live: self.lab.is_live(),
-                mode: spec.xray.mode,
-                lao_deg: spec.c_arm.primary_deg,
-                cra_deg: spec.c_arm.secondary_deg,
-                second_deg: self.lab.second_deg(),
-                magnification: self.lab.magnification(),
-                field_mm: self.lab.field_mm(),
-                open: self.lab.open(),
-                beam_s: self.lab.beam_s(),
-                dose_ugy: self.lab.dose_ugy(),
-                entrance_ugy: self.lab.entrance_ugy(),
-                kerma_area_ugym2: self.lab.kerma_area_ugym2(),
-                kvp: self.lab.kvp(),
-                current_ma: self.lab.current_ma(),
-                sid_mm: spec.c_arm.sid_mm,
-                contrast_ml: self.contrast_ml(),
-            },
-            packing: packing(self.sac.as_ref()),
-            subject: self.standing(),
-            event: self.events.last().cloned(),
-            events: self.events_in_all,
-            idle_keys: self.idle_keys(),
-        }
-    }
-
-    fn beyond(&self, report: &InstrumentReport) -> bool {
-        report.push_force_n.is_some_and(|force| force.abs() > self.limits.push_n)
-            || report.torque_nmm.abs() > self.limits.torque_nmm
-    }
-
-    fn warns(&self) -> bool {
-        self.simulation.report().hands().iter().any(|report| self.beyond(report))
-    }
-
-    fn instruments(&self) -> Vec<InstrumentReadout> {
-        let each = self.simulation.stack().instruments().iter().zip(self.simulation.report().hands());
-        each.zip(self.hands_mm())
-            .map(|((one, report), hand_mm)| InstrumentReadout {
-                name: one.name.clone(),
-                length_mm: one.device.length_mm(),
-                inserted_mm: report.inserted_mm,
-                behind_mm: hand_mm - report.inserted_mm,
-                rotation_deg: report.rotation_rad.to_degrees(),
-                steer: one.device.is_steerable().then_some(report.steer),
-                push_force_n: report.push_force_n,
-                torque_nmm: report.torque_nmm,
-                warns: self.beyond(&report),
-            })
-            .collect()
-    }
-
-    /// The instrument through which contrast medium is injected: the outermost inserted one with a lumen.
-    fn injects_through(&self) -> Option<usize> {
-        let open = lumens(self.simulation.stack(), self.lab.fluoro());
-        let in_it = |one: &usize| self.simulation.tip_of_mm(*one).is_some();
-        (0..open.len()).rev().filter(|one| open[*one]).find(in_it)
     }
 }

@@ -7,7 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use endowire_core::Error;
 use endowire_methods::Scene as SceneFile;
 use endowire_recording as recording;
-use endowire_recording::table::read_if_any;
+use endowire_recording::table::{Row, read_if_any};
 use endowire_recording::{
     COILS, CoilRow, Column, EndedBy, INJECTIONS, INSTRUMENTS, InjectionRow, InstrumentRow, PACKING, PLACES,
     PackingRow, PlaceRow, Program, Provenance, STEPS, SUMMARY, StepFailure, StepRow, Summary, UnknownRow,
@@ -172,7 +172,7 @@ impl Recording {
 type Contacts<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 
 /// The columns of a table of a recording, without rows of a step that was not written whole.
-fn columns<'py, T: DeserializeOwned + Serialize + Send + 'static>(
+fn columns<'py, T: DeserializeOwned + Serialize + Row + Send + 'static>(
     py: Python<'py>,
     of: &recording::Recording,
     name: &str,
@@ -321,7 +321,7 @@ impl Recorder {
         slf
     }
 
-    /// As `close`; an exception that ends the `with` statement is told in the summary as what has ended the recording.
+    /// As `close`; an exception that ends the `with` statement is reported in the summary as what has ended the recording.
     #[pyo3(signature = (kind=None, raised=None, trace=None))]
     fn __exit__(
         &self,

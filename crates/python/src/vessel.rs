@@ -284,7 +284,7 @@ impl Vessel {
         document::write(py, &openings)
     }
 
-    /// What was mended on its surface, and what in its lumen was taken as a wall: dictionaries of kind (such as
+    /// What was repaired on its surface, and what in its lumen was taken as a wall: dictionaries of kind (such as
     /// "hole_closed", "piece_dropped", "body_in_lumen", "sheet_in_lumen", "part_united", "body_in_wall"), triangles, at_mm and size_mm
     /// (middle and sides of the bounding box). Empty for a surface that is taken as it was given, and for a centre line.
     #[getter]

@@ -113,7 +113,7 @@ def test_a_batch_detaches_the_coils_of_some(deploying):
     deploying.detach(0)
     assert batch.state(0).to_bytes() == before
     assert batch.state(1).to_bytes() == deploying.state().to_bytes()
-    # What cannot be detached is told, and the others are not affected.
+    # What cannot be detached is reported, and the others are not affected.
     failures = batch.detach([0, 0])
     assert list(failures) == [1] and "detached already" in str(failures[1])
     with pytest.raises(endowire.InputError, match="instruments = 1: give one for each of the 2"):

@@ -46,7 +46,7 @@ def test_stiffness_and_friction_are_found_again(vessel):
     assert found.converged and not found.not_shown, found
     off = (found.values - [6.0, 14.0, 0.15]) / found.sigma
     assert np.all(np.abs(off) < 3.5), (found.values, found.sigma)
-    # The stiffness of the tip shows best, that of the shaft hardly: its curve is given by the tube.
+    # The stiffness of the tip shows best, that of the shaft barely: its curve is given by the tube.
     assert np.all(found.sigma < [0.1, 7.0, 0.05]), (found.values, found.sigma)
     # As many squares as numbers, less those that were fitted.
     assert abs(found.chi2 - found.n_residuals) < 4.0 * np.sqrt(2.0 * found.n_residuals)

@@ -189,7 +189,7 @@ def test_success_is_safe_where_no_force_of_the_episode_was_above_the_limit(task)
     strict = dataclasses.replace(task, force_limit_n=0.5 * easy.largest_wall_force_n)
     (hard,) = evaluation.evaluate(strict, policies.Steered("follow_path"), [5])
     assert hard.reached and not hard.safe_success
-    # The largest force of an episode is the largest that any of its steps has told.
+    # The largest force of an episode is the largest that any of its steps has reported.
     env, seen = InsertionEnv(task), []
     env.reset(seed=5)
     for _ in range(40):

@@ -31,7 +31,7 @@ def test_a_target_out_of_reach_is_refused_with_the_reason(arch):
     ):
         with pytest.raises(endowire.InputError, match=words):
             begun(arch, target, **parts)
-    # Where it is hardly too short it may cut corners: that is left to the simulation.
+    # Where it is barely too short it may cut corners: that is left to the simulation.
     begun(arch, carotid, length_mm=303.0)
 
 

@@ -21,7 +21,7 @@ VIEW = {"views": ["3d"], "size_px": [32, 32], "backend": "cpu"}
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", ["BasicWireNav", "DualDeviceNav", "CathSim", "Navigation"])
 def test_registered_ids_pass_the_checker(name):
-    # That a vessel stands in for another is warned of, and told.
+    # That a vessel stands in for another is warned of, and reported.
     warned = contextlib.nullcontext()
     if name != "Navigation":
         warned = pytest.warns(UserWarning, match=f"{name}: the built-in")

@@ -6,7 +6,7 @@ use endowire_core::{Error, Result};
 /// Hands add up but for rounding, which is far below this, mm and rad.
 const ROUNDING: f64 = 1e-6;
 
-/// Checks what is told of a step: the time at its end, s, which comes not before that of the step before, and its moves.
+/// Checks what is given for a step: the time at its end, s, which comes not before that of the step before, and its moves.
 ///
 /// # Errors
 /// [`Error::Parameter`] for a time that is earlier, and numbers that are not finite.

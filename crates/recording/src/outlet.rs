@@ -11,7 +11,7 @@ pub struct Outlet {
     /// Name of the instrument whose tip it leaves; `None` if it leaves through the sheath.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instrument: Option<String>,
-    /// Its position in the vessel at rest, mm: that of the tip when the injection began, or of the sheath's mouth.
+    /// Its position in the undisplaced vessel, mm: that of the tip when the injection began, or of the sheath's mouth.
     pub at_mm: Vec3,
     /// Sum of the magnitudes of wall forces at that tip when the injection began, N; `None` if it was not recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]

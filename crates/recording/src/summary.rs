@@ -34,7 +34,7 @@ pub struct Plane<E> {
     pub exposure: Option<E>,
 }
 
-/// The results of a whole insertion: summary.json. `E` is what is told of the exposure of frames.
+/// The results of a whole insertion: summary.json. `E` is what is reported of the exposure of frames.
 #[derive(Debug, Clone, Serialize)]
 pub struct Summary<E = ()> {
     /// Version of the recording's format, [`VERSION`].

@@ -143,7 +143,7 @@ impl RecordedVessel {
         self.course.is_some() || self.motion.as_ref().is_some_and(VesselMotion::changes)
     }
 
-    /// Its displacement after a step, at that time, s; at rest before the first.
+    /// Its displacement after a step, at that time, s; none before the first.
     pub fn at(&self, step: usize, time_s: f64) -> Option<Displacement> {
         let moved = self.motion.as_ref().map(|motion| motion.at(time_s));
         let Some((course, steps)) = &self.course else { return moved };

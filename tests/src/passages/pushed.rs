@@ -5,7 +5,7 @@ use endowire_core::{Error, PhysicalEnd, Result};
 
 use super::Question;
 
-/// A wall that hardly yields, N/mm²: what is too thick for it does not squeeze through. It rubs nothing.
+/// A wall that yields very little, N/mm²: what is too thick for it does not squeeze through. It rubs nothing.
 const RIGID_N_PER_MM2: f64 = 1e4;
 /// Commands, mm.
 const STEP_MM: f64 = 2.0;

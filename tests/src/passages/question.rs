@@ -11,7 +11,7 @@ use crate::noise::Noise;
 /// Radii and bending stiffnesses of devices, mm and N·mm²: from a microwire to a guiding catheter.
 const RADIUS_MM: [f64; 2] = [0.15, 1.5];
 const STIFFNESS_NMM2: [f64; 2] = [1.0, 3000.0];
-/// The radius of every other device is so many of the least radius of its way, if that is a device's: what hardly passes is the hard question.
+/// The radius of every other device is so many of the least radius of its way, if that is a device's: what barely passes is the hard question.
 const HARDLY: [f64; 2] = [0.6, 1.4];
 /// Lengths of most devices over that of the way, and of the one in so many that is too short.
 const LONG: [f64; 2] = [1.2, 1.6];

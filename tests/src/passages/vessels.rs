@@ -37,7 +37,7 @@ pub struct Vessel {
     pub what: String,
     /// Its centre line, as it was drawn.
     pub tree: CentrelineTree,
-    /// Its wall, mended if that was spoiled.
+    /// Its wall, repaired if that was spoiled.
     pub wall: Wall,
     /// The opening where its centre line begins.
     pub inlet: usize,
@@ -47,7 +47,7 @@ impl Vessel {
     /// A tube, or the way to a target of an anatomy, with none to two stenoses; the wall of one in three is spoiled.
     ///
     /// # Errors
-    /// Bends tighter than the vessel is wide, stenoses on each other, a spoiled wall that cannot be mended.
+    /// Bends tighter than the vessel is wide, stenoses on each other, a spoiled wall that cannot be repaired.
     pub(super) fn draw(random: &mut Noise) -> Result<Self> {
         let (mut what, mut nodes) = if random.happens(0.6) { tube(random) } else { way(random)? };
         for _ in 0..random.below(3) {

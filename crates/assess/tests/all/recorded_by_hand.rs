@@ -494,7 +494,7 @@ fn tables_of_a_run_that_do_not_fit_each_other_are_refused() {
             HANDS.replace("5,5,0,0", "-5,5,0,0"),
             "step[1].catheter.inserted_mm = -5: must be",
         ),
-        ("packing.csv", lines("packing.csv", 2), "step = 2: is missing, and steps.csv has it"),
+        ("packing.csv", lines("packing.csv", 2), "step = 2: is missing from line 3 on, and steps.csv has it"),
         (
             "injections.csv",
             INJECTIONS.replace("device", "cathter"),

@@ -76,7 +76,7 @@ pub(crate) enum DeviceCommand {
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(crate) struct CoordinateArgs {
     /// Millimetres per unit of the file
-    #[arg(long, default_value_t = 1.0, value_name = "MM")]
+    #[arg(long, default_value_t = 1.0, value_name = "MM", value_parser = parse_above_zero)]
     pub(crate) unit_mm: f64,
     /// Axes of the file, LPS or RAS; if absent, those of its header, or LPS
     #[arg(long, value_name = "AXES")]
@@ -92,7 +92,7 @@ impl From<CoordinateArgs> for SurfaceFrame {
 /// What of a surface is repaired, as `vessel.repair` and `vessel.keep_open_mm` of a scene say.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(crate) struct RepairArgs {
-    /// all: faults are mended; none: the surface is taken as it is, or refused
+    /// all: faults are repaired; none: the surface is taken as it is, or refused
     #[arg(long, value_name = "all|none", default_value = "all")]
     pub(crate) repair: RepairMode,
     /// A place x,y,z in mm: the hole nearest to it is meant, and is not closed (repeatable)
@@ -247,6 +247,14 @@ pub(crate) struct StraightenArgs {
 fn parse_place(text: &str) -> Result<Vec3, String> {
     match parse_end(text) {
         Ok(CentrelineEnd::Place(place_mm)) => Ok(place_mm),
+        Err(far) if text.split(',').count() == 3 => Err(far),
         _ => Err("expected a place x,y,z in mm".to_owned()),
     }
+}
+
+/// Parses a number above 0.
+pub(super) fn parse_above_zero(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| "expected a number".to_owned())?;
+    let is_right = number.is_finite() && number > 0.0;
+    is_right.then_some(number).ok_or_else(|| "must be a finite number above 0".to_owned())
 }

@@ -271,10 +271,10 @@ pub(crate) struct PlayArgs {
     #[arg(long, default_value_t, value_name = "N|all")]
     pub(crate) solves: crate::commands::play::Solves,
     /// Warn where a hand pushes or pulls harder than this
-    #[arg(long, default_value_t = 1.0, value_name = "N")]
+    #[arg(long, default_value_t = 1.0, value_name = "N", value_parser = inputs::parse_above_zero)]
     pub(crate) warn_n: f64,
     /// Warn where a hand holds a greater torque than this
-    #[arg(long, default_value_t = 5.0, value_name = "N·MM")]
+    #[arg(long, default_value_t = 5.0, value_name = "N·MM", value_parser = inputs::parse_above_zero)]
     pub(crate) warn_nmm: f64,
     #[command(flatten)]
     pub(crate) cache: CacheArgs,

@@ -73,6 +73,9 @@ pub(super) fn as_flag(error: Error) -> Failure {
     })
 }
 
+/// Farthest coordinate of a place, mm, as of a centre line.
+const FARTHEST_MM: f64 = 1e6;
+
 /// Parses `--from` and `--to`: the number of an opening, or a place `x,y,z`.
 pub(crate) fn parse_end(text: &str) -> Result<CentrelineEnd, String> {
     let remedy =
@@ -81,7 +84,13 @@ pub(crate) fn parse_end(text: &str) -> Result<CentrelineEnd, String> {
     match numbers.as_slice() {
         [opening] => opening.parse().map(CentrelineEnd::Opening).map_err(|_| remedy.to_owned()),
         [x, y, z] => match (x.parse(), y.parse(), z.parse()) {
-            (Ok(x), Ok(y), Ok(z)) => Ok(CentrelineEnd::Place([x, y, z].into())),
+            (Ok(x), Ok(y), Ok(z)) => {
+                let place = [x, y, z];
+                // A NaN is not within either.
+                let is_near = place.iter().all(|x: &f64| x.abs() <= FARTHEST_MM);
+                let far = || format!("a place has finite numbers of at most {FARTHEST_MM} mm");
+                is_near.then(|| CentrelineEnd::Place(place.into())).ok_or_else(far)
+            }
             _ => Err(remedy.to_owned()),
         },
         _ => Err(remedy.to_owned()),

@@ -25,7 +25,7 @@ const GREY: RGBColor = RGBColor(90, 90, 90);
 /// Background of bands.
 const BAND: RGBColor = RGBColor(238, 241, 245);
 
-/// Order of colours of [`chart::COLOURS`] that are told apart best, without greys.
+/// Order of colours of [`chart::COLOURS`] that are distinguished best, without greys.
 const ORDER: [usize; 9] = [0, 3, 4, 5, 7, 8, 6, 10, 9];
 
 /// Colour of the curve number `index`.

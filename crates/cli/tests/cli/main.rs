@@ -21,6 +21,7 @@ mod guide;
 mod instruments;
 mod killed;
 mod methods;
+mod numbers;
 mod packages;
 #[cfg(all(unix, feature = "window"))]
 mod pictures;

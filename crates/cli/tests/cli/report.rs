@@ -19,7 +19,7 @@ fn page(folder: &Path) -> PathBuf {
     run.join("report.html")
 }
 
-/// Whether a page names no other place, and is told to load nothing from any.
+/// Whether a page names no other place, and is forbidden to load anything from any.
 fn loads_nothing(page: &str) -> bool {
     !page.replace("http-equiv", "").contains("http") && page.contains("content=\"default-src 'none'; ")
 }

@@ -309,7 +309,7 @@ impl Friction {
 }
 
 /// ε for a step with these hand motions and a device of that radius, and its lower bound while the hands hold still,
-/// mm. An instrument at rest gets the ε of those that move.
+/// mm. An instrument that is still gets the ε of those that move.
 pub(crate) fn stick_mm(hands: &[HandMotion], radius_mm: f64, tuning: &FrictionTuning) -> [f64; 2] {
     let ways = hands.iter().map(|hand| hand.advance_mm().abs() + radius_mm * hand.turn_rad.abs());
     let way_mm = ways.fold(0.0, f64::max);

@@ -53,7 +53,7 @@ pub(crate) struct MovedWall<'a> {
 }
 
 impl<'a> From<&'a ContactSurface> for MovedWall<'a> {
-    /// The wall of a vessel at rest.
+    /// The wall of a vessel that is not displaced.
     fn from(surface: &'a ContactSurface) -> Self {
         Self { surface, displacement: None }
     }
@@ -73,7 +73,7 @@ impl<'a> MovedWall<'a> {
         Self { surface, displacement }
     }
 
-    /// Whether material points are elsewhere than at rest.
+    /// Whether material points are displaced.
     pub(super) fn is_displaced(&self) -> bool {
         self.displacement.is_some()
     }

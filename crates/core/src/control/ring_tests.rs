@@ -1,4 +1,4 @@
-//! Where vessels meet again, hands reach a target by the arm that they are told.
+//! Where vessels meet again, hands reach a target by the arm that they are given.
 
 use super::*;
 use crate::Vec3;

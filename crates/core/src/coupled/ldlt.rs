@@ -11,7 +11,7 @@
 //! and which depends on none that has changed, is kept: where a few contacts open or close, that is most of them. The
 //! bits are those of a factorisation from the beginning.
 //!
-//! Blocks have 6 to 12 rows, a compile-time number, as in the band: the supernodes of coils are hardly larger, and a
+//! Blocks have 6 to 12 rows, a compile-time number, as in the band: the supernodes of coils are barely larger, and a
 //! general sparse factorisation of such small ones takes four times as long (decision 18).
 
 use pulp::{Arch, Simd, WithSimd};

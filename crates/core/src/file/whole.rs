@@ -3,7 +3,7 @@
 //!
 //! Only regular files are replaced. A device of characters, such as `/dev/null`, is written to, as by any other program;
 //! pipes, disks and sockets are refused: a pipe that nobody reads would be waited for without end. Temporary files are new and locked while they are written: no link is followed, and what a killed
-//! program leaves can be told from what another is writing.
+//! program leaves can be distinguished from what another is writing.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{File, FileType, OpenOptions, TryLockError};

@@ -121,7 +121,7 @@ fn backwards_it_is_the_gradient_of_the_commands() {
         });
         for (k, parameter) in by.iter().enumerate() {
             let own = Vec3::new(back[0][k], back[1][k], back[2][k]);
-            // What hardly moves the tip has no digits in common.
+            // What barely moves the tip has no digits in common.
             if slopes[k].norm() > 1e-4 {
                 let off = (own - slopes[k]).norm() / slopes[k].norm();
                 assert!(off < OF_SIDES, "{scene} {parameter:?}: {own:?} {:?}", slopes[k]);

@@ -193,7 +193,7 @@ impl Simulation {
     /// For haptics and displays that need an answer in time.
     ///
     /// Unfinished motion is reported ([`StepReport::behind`], [`StepReport::imbalance`]), and the next tick or step
-    /// continues it, or [`Simulation::forget`] drops it; with hands at rest ticks reach an equilibrium. No state is beyond a wall: hands whose way is
+    /// continues it, or [`Simulation::forget`] drops it; with still hands ticks reach an equilibrium. No state is beyond a wall: hands whose way is
     /// blocked in the tick wait. If the vessel moves and these solves do not suffice, the tick takes as many as a
     /// step. Methods other than `kirchhoff` take a step.
     ///
@@ -494,7 +494,7 @@ impl Simulation {
         self.course().map_or(0.0, |course| course.largest_mm(self.course_mm()))
     }
 
-    /// The vessel at rest.
+    /// The undisplaced vessel.
     pub fn lumen(&self) -> &Lumen {
         &self.scene.lumen
     }

@@ -300,7 +300,7 @@ pub trait MethodChoice: Debug {
         Err(Error::parameter("method.name", self.name(), "this method knows no coils: use kirchhoff"))
     }
 
-    /// The method at rest at the sheath, nothing inserted; walls that are costly to build come from `store`.
+    /// The method at its start at the sheath, nothing inserted; walls that are costly to build come from `store`.
     ///
     /// # Errors
     /// Options out of range, and features the method does not support.

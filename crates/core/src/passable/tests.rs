@@ -59,7 +59,7 @@ fn a_narrowing_lets_pass_what_is_thinner() {
 #[test]
 fn the_room_lets_a_device_cut_a_bend() {
     let sharpest = |way: &CentrelinePath| passable(way, &wire(0.5, 10.0), NO_FORCE_N).unwrap().sharpest;
-    // With hardly any clearance the path is the centre line's.
+    // With almost no clearance the path is the centre line's.
     let narrow = sharpest(&bend(30.0, 90.0, 0.52));
     assert!((narrow.cut_radius_mm / 30.0 - 1.0).abs() < 0.1, "{narrow:?}");
     // The moment of a wire that touches the outer wall, the inner one in the middle of the bend and the outer one

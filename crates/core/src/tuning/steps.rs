@@ -41,9 +41,9 @@ pub struct StepTuning {
     /// Number of further relaxations, with the hands held still, of a device that rests at the end of its command but
     /// not in equilibrium.
     pub again: usize,
-    /// Motion in a further relaxation, in the smallest radius of the device, below which it is at rest.
+    /// Motion in a further relaxation, in the smallest radius of the device, below which it is still.
     pub rest_radii: f64,
-    /// Residual, relative to the force scale, above which a device that does not move is not at rest.
+    /// Residual, relative to the force scale, above which a device that does not move is in no equilibrium.
     pub at_rest: f64,
     /// Cost of a part beside its own linear solves, in linear solves: it builds a mesh and evaluates the whole wall
     /// once.

@@ -51,7 +51,7 @@ pub struct TorqueResponse {
     pub largest_lag_deg: f64,
     /// Angle by which the tip is behind the hand, degrees, averaged over the last turn.
     pub mean_lag_deg: f64,
-    /// Largest whip: the angle by which the tip jumps ahead while the hand hardly turns, degrees; 0 if it never jumps.
+    /// Largest whip: the angle by which the tip jumps ahead while the hand turns almost not at all, degrees; 0 if it never jumps.
     pub largest_whip_deg: f64,
     /// Angle of the hand, degrees, at the largest whip.
     pub whip_at_deg: Option<f64>,

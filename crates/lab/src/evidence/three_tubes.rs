@@ -396,7 +396,7 @@ fn cost(errors_mm: &[Option<Vec3>]) -> f64 {
 /// Vectors from measured to computed tips of the rows that are fitted, for each of several sets of parameters.
 type Errors<'a> = dyn Fn(&[Parameters]) -> Result<Vec<Vec<Option<Vec3>>>> + 'a;
 
-/// Fits the parameters by Levenberg's and Marquardt's method with derivatives by differences; `told` hears of every iteration.
+/// Fits the parameters by Levenberg's and Marquardt's method with derivatives by differences; `told` is called after every iteration.
 ///
 /// # Errors
 /// As `of`.
@@ -456,7 +456,7 @@ fn fit(start: Parameters, of: &Errors<'_>, told: &dyn Fn(usize)) -> Result<Param
 }
 
 /// Compares the measured tips with the computed ones: with the published numbers on all rows, and with numbers that were
-/// fitted to every eighth row on the others, and what is asked for beside that. `told` hears of every iteration of a fit, of at most
+/// fitted to every eighth row on the others, and what is asked for beside that. `told` is called after every iteration of a fit, of at most
 /// [`MOST_STEPS`].
 ///
 /// # Errors

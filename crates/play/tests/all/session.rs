@@ -131,7 +131,7 @@ fn two_thousand_inputs_replay(scene: Scene, mut session: Session) {
 
 #[test]
 fn what_ticks_leave_over_is_followed_while_hands_rest() {
-    // Largest lag of the device, tip at rest.
+    // Largest lag of the device, with its tip still.
     let pushed = |solves: Option<usize>| {
         let (_, mut session) = session("arch_innominate.toml");
         if let Some(solves) = solves {

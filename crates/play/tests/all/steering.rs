@@ -67,7 +67,7 @@ fn a_hand_steers_at_a_rate_to_a_value_and_holds_it() {
     assert!((value(&session) - 0.25).abs() < 1e-9, "{}", value(&session));
     let bent_mm = session.simulation().shape().tip_mm().unwrap();
     assert!((bent_mm - straight_mm).norm() > 5.0, "{bent_mm} {straight_mm}");
-    // Held, it stays; and a tick at rest is no step.
+    // Held, it stays; and a tick without motion is no step.
     session.apply(&steer(None, None)).unwrap();
     let steps = session.steps();
     ticks(&mut session, 10);

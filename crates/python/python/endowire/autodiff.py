@@ -58,7 +58,7 @@ class Response:
             raise InputError("by = 'hand': it stands for two: give 'advance' and 'rotate'")
         self.across_jumps = across_jumps
         self._last: tuple[bytes, Recorded] | None = None
-        # Words and kinds are asked for once, so that a wrong one is told here.
+        # Words and kinds are asked for once, so that a wrong one is reported here.
         self.start
         for one in self.of:
             numbers(simulation, one)

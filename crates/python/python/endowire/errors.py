@@ -16,5 +16,5 @@ class ComputationError(EndowireError, RuntimeError):
 class EndOfWay(EndowireError):
     """The instruments cannot advance: the tip has left the vessel, or the vessel is narrower than they are."""
 
-    #: What the end is: "blocked" where the vessel is too narrow, "left" behind an opening, or "failed" if it is not told.
+    #: What the end is: "blocked" where the vessel is too narrow, "left" behind an opening, or "failed" if it is not known.
     ended_by: str = "failed"

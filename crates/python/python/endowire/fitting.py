@@ -138,7 +138,7 @@ class Fit:
     #: Sum of squares of the residuals, in units of sigma, and their number.
     chi2: float
     n_residuals: int
-    #: Whether the last step changed hardly anything.
+    #: Whether the last step changed almost nothing.
     converged: bool
     iterations: int
     #: The simulation where it began, with these values.

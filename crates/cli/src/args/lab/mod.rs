@@ -22,8 +22,8 @@ pub(crate) struct VerifyArgs {
     #[arg(long)]
     pub(crate) stress: bool,
     /// Number of random commands in each case of the stress table with several instruments
-    #[arg(long, default_value_t = 1_000, value_name = "COUNT", requires = "stress")]
-    pub(crate) commands: usize,
+    #[arg(long, default_value_t = 1_000, value_name = "COUNT", requires = "stress", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) commands: u32,
     /// Instead of the reference cases, run a matrix of insertions into every surface of a folder (STL, OBJ, PLY; NAME.toml beside a
     /// surface may give unit_mm, a table sheath, length_mm and device_radius_mm)
     #[arg(long, value_name = "DIR", conflicts_with = "stress")]
@@ -38,8 +38,8 @@ pub(crate) struct VerifyArgs {
     #[arg(long, requires = "surfaces", conflicts_with = "json")]
     pub(crate) scene: bool,
     /// Cells that run at the same time; the number of cores if absent
-    #[arg(long, value_name = "N", requires = "surfaces")]
-    pub(crate) jobs: Option<usize>,
+    #[arg(long, value_name = "N", requires = "surfaces", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) jobs: Option<u16>,
     /// Longest time of a cell: one that takes longer fails
     #[arg(long, default_value_t = 120.0, value_name = "S", requires = "surfaces")]
     pub(crate) limit_s: f64,

@@ -124,7 +124,7 @@ impl Course {
     }
 
     /// Times and material places of the tip up to a state; empty if nothing is injected at the tip. If script lines
-    /// inject, time advances with the steps; otherwise the instruments are at rest for all times.
+    /// inject, time advances with the steps; otherwise the instruments are still at all times.
     pub(super) fn way_of_tip(&self, moment: &FrameTime) -> Vec<(f64, Vec3)> {
         if !self.view.injects_at_tip() {
             return vec![];

@@ -65,7 +65,7 @@ impl Glb {
         self.accessor(accessor)
     }
 
-    /// Places of vertices, whose bounds are told.
+    /// Places of vertices, whose bounds are written.
     pub(super) fn places(&mut self, numbers: &[f32]) -> usize {
         let accessor = self.floats(numbers, "VEC3", Some(VERTICES));
         self.bounded(accessor, numbers, 3)

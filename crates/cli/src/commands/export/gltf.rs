@@ -66,7 +66,7 @@ fn flat(points: impl Iterator<Item = Vec3>) -> Vec<f32> {
     points.flat_map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect()
 }
 
-/// The vessel; one that moves or yields is animated by differences from where it is at rest.
+/// The vessel; one that moves or yields is animated by differences from where it is before it is displaced.
 fn vessel(run: &Run, glb: &mut Glb, moved: &[(usize, f64)]) -> usize {
     let rest = run.vertices_mm(None);
     let positions = glb.places(&flat(rest.iter().map(place)));

@@ -111,7 +111,7 @@ mod tests {
         }
         assert!(one.0.len() > 8 && one.0.len() < 20, "{:?}", one.0);
         assert!(three.0.len() > 2 * one.0.len(), "{} for three beats", three.0.len());
-        // What is told of fewer keys is the error that they have.
+        // What is reported of fewer keys is the error that they have.
         let (few, error_mm) = choose(&swinging(121), 5);
         assert!(few.len() == 5 && error_mm > 1.0, "{few:?} {error_mm}");
     }

@@ -134,7 +134,7 @@ fn run_all(jobs: &[(&Surface, Cell)], args: &VerifyArgs, cache: &Cache) -> Vec<C
     let bar = progress::bar(jobs.len(), "cell");
     let start = Instant::now();
     let clock = || start.elapsed().as_secs_f64();
-    let rows = in_parallel(jobs.len(), args.jobs, |index| {
+    let rows = in_parallel(jobs.len(), args.jobs.map(usize::from), |index| {
         let (surface, cell) = &jobs[index];
         bar.set_message(cell.name_in(surface));
         // A panic in one cell must not end the others.

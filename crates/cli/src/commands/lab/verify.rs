@@ -92,7 +92,7 @@ pub(crate) fn verify(args: &VerifyArgs) -> std::result::Result<(), Failure> {
     for case in &together {
         bar.set_message(format!("instruments in {}", case.vessel));
         let clock = Instant::now();
-        let row = InstrumentStress::run(case, args.commands);
+        let row = InstrumentStress::run(case, args.commands as usize);
         instruments.push(Instruments { row, time_s: clock.elapsed().as_secs_f64() });
         bar.inc(1);
     }

@@ -1,7 +1,7 @@
 //! Updating the normal forces of friction from the contact forces.
 //!
 //! Within a Newton step they are those of its base, so that friction has a potential. They are renewed at every base
-//! until they match the contact forces and hardly change, and again after an equilibrium at which they turn out to
+//! until they match the contact forces and barely change, and again after an equilibrium at which they turn out to
 //! differ.
 
 use super::coulomb::Coulomb;

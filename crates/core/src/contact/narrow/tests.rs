@@ -100,7 +100,7 @@ fn derivatives_are_those_of_the_distance_where_a_tube_joins_the_mesh() {
             let bend = (after.gradient - before.gradient) / (2.0 * h);
             assert!((bend - d.hessian.column(axis)).norm() < 0.02, "{x}: {bend} {}", d.hessian);
         }
-        // The two hardly differ there, or the joint would push along the vessel.
+        // The two barely differ there, or the joint would push along the vessel.
         assert!((d.gradient.norm() - 1.0).abs() < 0.02, "{x}: {}", d.gradient.norm());
     }
     assert!(joined > 30, "{joined}");

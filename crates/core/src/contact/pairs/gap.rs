@@ -10,7 +10,7 @@
 //! (the Moreau envelope of the squared distance along A: J.-J. Moreau, Bull. Soc. Math. France 93 (1965)). Where the
 //! two are parallel, Φ has one minimum for each site, at s = sᵢ, and sites sum to the integral of a line contact.
 //! Where they cross at an angle α, the sites near the crossing slide to the crossing itself, their forces act there,
-//! and G² = d² + ε sin²α (sᵢ − s)²/(ε + sin²α) hardly depends on the positions of sites: this unifies what are two
+//! and G² = d² + ε sin²α (sᵢ − s)²/(ε + sin²α) barely depends on the positions of sites: this unifies what are two
 //! formulations elsewhere, for lines and for points (C. Meier, W. A. Wall, A. Popp, *A unified approach for
 //! beam-to-beam contact*, CMAME 315 (2017)).
 //!

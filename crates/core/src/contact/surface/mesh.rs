@@ -134,7 +134,7 @@ impl ContactMesh {
 
     /// As [`Self::nearness`], of the mesh alone.
     ///
-    /// Where quadrics hardly reach, the flat triangles replace them gradually: with their coverage C, F = f + λ(C) (d
+    /// Where quadrics barely reach, the flat triangles replace them gradually: with their coverage C, F = f + λ(C) (d
     /// − f) blends the smooth distance f into that of the triangles, d.
     fn nearness_of_mesh(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Nearness {
         if let Some((nearness, coverage)) = self.smooth.within(x, triangle, limit_mm)

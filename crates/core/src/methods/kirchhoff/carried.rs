@@ -9,7 +9,7 @@
 //! ```
 //!
 //! and continues straight at its tip where the curve is too short. The sheath does not move. From there the sub-step
-//! proceeds as in a vessel at rest; slip is measured from the material points themselves
+//! proceeds as in a vessel that does not move; slip is measured from the material points themselves
 //! ([`Friction::carry`](crate::contact::Friction::carry)).
 
 use super::balance::OuterWork;

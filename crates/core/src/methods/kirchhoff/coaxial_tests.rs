@@ -105,7 +105,7 @@ fn advanced(simulation: &mut Simulation, step_mm: f64, count: usize) -> (Vec<f64
 }
 
 /// Largest jump of five energies over their smooth trend: fourth differences contain it three times, and the trend
-/// hardly at all.
+/// barely at all.
 fn jump(w: &[f64]) -> f64 {
     (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs() / 3.0
 }

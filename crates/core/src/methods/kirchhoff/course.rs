@@ -204,10 +204,10 @@ impl<'a> Course<'a> {
         shortens
     }
 
-    /// Takes the result of a part, in which the device hardly moved if it `lies` still, after so many iterations.
+    /// Takes the result of a part, in which the device barely moved if it `lies` still, after so many iterations.
     pub(super) fn accept(&mut self, part: &Part<'_>, found: &Found, lies: bool, iterations: usize) {
         // At a crease of the wall forces switch between both sides and never balance; if nothing moves any more the
-        // device is at rest all the same.
+        // device is in equilibrium all the same.
         let rests = part.holds_still && lies && found.residual <= self.tuning.at_rest;
         self.balanced = (found.balanced && !found.lacks) || rests;
         let overtook = self.change.overtakes;

@@ -112,7 +112,7 @@ fn of_two_instruments_the_outer_is_dragged_where_it_is_and_the_hands_hold_both()
     let found = |index: usize| -report.instruments[index].push_force_n.unwrap();
     assert!((found(0) / wire - 1.0).abs() < 0.01 && (found(1) / catheter - 1.0).abs() < 0.02, "{report:?}");
     assert!((found(0) + found(1) - report.drag_n.z).abs() < 1e-6 * report.drag_n.z);
-    // Over a wire at rest the catheter moves with the flow or against it without a jump.
+    // Over a still wire the catheter moves with the flow or against it without a jump.
     for mm in [10.0, -10.0] {
         let report = both.step_together(&[advance(1, mm)]).unwrap();
         assert!(report.converged && !report.jumped, "{report:?}");

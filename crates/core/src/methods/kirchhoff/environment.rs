@@ -22,7 +22,7 @@ pub(super) struct Environment<'a> {
 }
 
 impl<'a> Environment<'a> {
-    /// For a vessel at rest.
+    /// For a vessel that does not move.
     pub(super) fn new(
         surroundings: &Surroundings<'a>,
         surface: &'a ContactSurface,

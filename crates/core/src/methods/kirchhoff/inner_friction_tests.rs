@@ -16,7 +16,7 @@ const MISSING: f64 = 1.0 / LENGTH_MM;
 const CURVATURE: f64 = 0.03;
 /// A low torsional stiffness of the wire, N·mm²: it is twisted by a fraction of a turn.
 const SOFT_NMM2: f64 = 0.5;
-/// A high one: it is hardly twisted.
+/// A high one: it is barely twisted.
 const STIFF_NMM2: f64 = 100.0;
 
 /// A straight wire of this torsional stiffness, N·mm², in a catheter that is curved everywhere and does not twist;

@@ -211,7 +211,7 @@ impl<const C: usize> Kirchhoff<C> {
         Ok(method)
     }
 
-    /// Whether nothing remains to be done: hands, vessel and device are at rest; its report then says so.
+    /// Whether nothing remains to be done: hands, vessel and device are still; its report then says so.
     fn rests(&mut self, surroundings: &Surroundings<'_>, moves: &[Move]) -> bool {
         let still = moves.iter().all(|one| one.command == Command::default());
         let rests =

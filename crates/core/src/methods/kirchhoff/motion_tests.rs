@@ -96,7 +96,7 @@ fn push(simulation: &mut Simulation, length_mm: f64) -> Result<()> {
     Ok(())
 }
 
-/// Waits until a time in steps of a tenth of a second, hands at rest.
+/// Waits until a time in steps of a tenth of a second, with hands still.
 fn wait(simulation: &mut Simulation, until_s: f64) -> Result<()> {
     let start_s = simulation.time_s();
     let count = ((until_s - start_s) / 0.1).round();
@@ -318,7 +318,7 @@ fn a_state_holds_the_time_and_goes_on_to_the_bit() {
     assert!(simulation.step_until(&[], Some(f64::NAN)).is_err());
 }
 
-/// What sticks between instruments may creep by a part of what moves, as on the wall: with hands at rest that is the vessel.
+/// What sticks between instruments may creep by a part of what moves, as on the wall: with still hands that is the vessel.
 #[test]
 fn instruments_that_rub_each_other_rest_in_a_vessel_that_breathes() {
     let each = [("wire", 800.0, 0.445, 5000.0), ("catheter", 600.0, 0.665, 60.0)];

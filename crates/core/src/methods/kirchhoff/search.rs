@@ -6,7 +6,7 @@
 //! If none is near however short the part, friction is held at the normal forces of its start: then the energy is
 //! bounded below, every Newton step lowers it, and the iteration ends at a minimum. If friction that follows from
 //! there finds no equilibrium nearby, the hand holds still and the device relaxes: slip is repeatedly reset, with the
-//! current normal forces, until they no longer change. Each relaxation starts almost at rest, so it ends lower than
+//! current normal forces, until they no longer change. Each relaxation starts almost without motion, so it ends lower than
 //! it began by the dissipation,
 //!
 //! ```text
@@ -231,7 +231,7 @@ impl<const C: usize> Search<'_, '_, C> {
         // A device that slides or relaxes when the solves are used up is seen on its way.
         let is_interrupted = used_up && (effort == Effort::Flight || self.slides > 0);
         let near = effort != Effort::Flight && !is_interrupted;
-        // A device at rest is accepted as an equilibrium if its accuracy is that of friction elsewhere.
+        // A device that has come to a stop is accepted as an equilibrium if its accuracy is that of friction elsewhere.
         let settled = tuning.friction.settled;
         let balanced = (found.converged || (!near && found.residual < settled)) && unsettled < settled;
         let goes_on = used_up && judged.before + self.iterations < tuning.steps.most_near;

@@ -31,7 +31,7 @@ pub struct KirchhoffState {
     pub(super) twists: Vec<Twist>,
     /// Force between device and sheath across the axis, N.
     pub(super) across_n: f64,
-    /// Motion of the hands that commands have not yet carried out; empty if the device is at rest where they are.
+    /// Motion of the hands that commands have not yet carried out; empty if the device is in equilibrium where they are.
     pub(super) behind: Vec<Command>,
     pub(super) rod: RodState,
     /// Displacements of the unknowns of the vessel's course, mm; empty if it does not yield.
@@ -185,7 +185,7 @@ impl KirchhoffState {
     }
 
     /// Drops motion of the hands that is left, and the solution that was begun for it. A relaxation in progress goes on:
-    /// where the device is seen on its way it is not at rest.
+    /// where the device is seen on its way it is in no equilibrium.
     pub(super) fn forget(&mut self) {
         if let Some(unfinished) = self.unfinished.as_deref_mut()
             && unfinished.flight.is_some()
@@ -202,7 +202,7 @@ impl KirchhoffState {
         self.touches.iter().fold(0.0, |deepest_mm, (_, touch)| touch.contact.penetration_mm.max(deepest_mm))
     }
 
-    /// Places of its nodes in the vessel at rest, mm, from the entry to the tip.
+    /// Places of its nodes in the undisplaced vessel, mm, from the entry to the tip.
     pub(super) fn material_line(&self, wall: MovedWall<'_>) -> impl Iterator<Item = Vec3> {
         self.rod.positions[..=self.rod.elements()].iter().map(move |x| wall.material(x))
     }

@@ -256,7 +256,7 @@ impl<const C: usize> Tools<C> {
         self.keep(start, mesh, after);
         let outside_mj = self.write_forces(environment, next);
         let residual = searched.found.residual;
-        // Where the device is not at rest its own are arbitrary, and would count as work.
+        // Where the device is still moving its own are arbitrary, and would count as work.
         if residual > tuning.steps.at_rest {
             next.parts().1.hand_forces.clone_from(&start.state.hand_forces);
         }

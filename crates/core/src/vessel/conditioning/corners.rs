@@ -374,7 +374,7 @@ impl Corners {
         (0..self.out.len() as u32).filter(|&v| self.out[v as usize] != NONE)
     }
 
-    /// Sets all normals: means over the adjacent triangles, by angle and area, hardly affected by slivers.
+    /// Sets all normals: means over the adjacent triangles, by angle and area, barely affected by slivers.
     pub(super) fn set_normals(&mut self) {
         let at: Vec<Vec3> = self.vertices.iter().map(|v| v.at).collect();
         let normals = vertex_normals(&self.triangles, &at);

@@ -97,7 +97,7 @@ fn both_arms_of_a_ring_are_found_with_their_lengths_and_radii() {
     let told = format!("{:?} {:?} {}", ways(1.0), arms(1.0), radii(lumen_mm));
     assert!(arms(1.0).iter().all(|off| *off < 0.01) && ways(1.0).iter().all(|off| *off < 0.015), "{told}");
     assert!(radii(lumen_mm) < 0.02 && inner.len() > 60);
-    // The twins: lengths and radii that are 3 % off are told.
+    // The twins: lengths and radii that are 3 % off are seen.
     assert!(ways(1.03).into_iter().chain(arms(1.03)).all(|off| off > 0.01) && radii(1.03 * lumen_mm) > 0.02);
     // Its table says the same, and so does the same wall again.
     let table = tree.table("a ring");

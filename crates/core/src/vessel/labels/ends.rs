@@ -2,7 +2,7 @@
 //!
 //! The way from one end of a part to each of its voxels has its local maxima at the ends of branches. A maximum counts by
 //! how much longer the way is there than where its branch meets another (its persistence, as in topology): a bump of
-//! the wall is short against the width of the branch, a branch is long. Two kinds of ends are told apart:
+//! the wall is short against the width of the branch, a branch is long. Two kinds of ends are distinguished:
 //!
 //! - [`EndKind::Border`]: the branch goes on beyond the picture. It touches the border with at least
 //!   [`LEAST_PATCH`] of its section, and is at least half as long as wide.

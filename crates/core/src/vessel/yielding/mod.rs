@@ -70,7 +70,7 @@ use stiffness::{Held, Properties};
 #[derive(Debug)]
 pub struct Course {
     spec: YieldingSpec,
-    /// Named places of the vessel at rest, mm.
+    /// Named places of the undisplaced vessel, mm.
     places: Vec<(String, Vec3)>,
     chains: Vec<Chain>,
     /// The first coefficient of each run among all.
@@ -116,7 +116,7 @@ impl Course {
         &self.spec
     }
 
-    /// Named places of the vessel at rest, mm: the targets of its centre line.
+    /// Named places of the undisplaced vessel, mm: the targets of its centre line.
     pub fn places(&self) -> &[(String, Vec3)] {
         &self.places
     }
@@ -163,7 +163,7 @@ impl Course {
         (0..self.unknowns()).map(at).collect()
     }
 
-    /// At a material point of the vessel at rest: unknowns in ascending order, each with the matrix W by which it moves the
+    /// At a material point of the undisplaced vessel: unknowns in ascending order, each with the matrix W by which it moves the
     /// point, and P, for which P δa is the gradient of `force`·W δa in the point.
     pub(crate) fn weights(&self, material: &Vec3, force: &Vec3) -> Vec<(usize, [Matrix3<f64>; 2])> {
         let of_all = self.samples.weights(material, force, (&self.chains, &self.firsts));

@@ -8,7 +8,7 @@ use crate::Vec3;
 /// Name of the centre line's beginning.
 const INLET: &str = "inlet";
 
-/// A measure of the vessel at rest, and displaced.
+/// A measure of the undisplaced vessel, and of the displaced one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BeforeAfter {
     /// At rest.
@@ -37,7 +37,7 @@ pub struct Stretch {
 pub struct Landmark {
     /// Its name.
     pub name: String,
-    /// Where it is at rest, mm.
+    /// Where it is before it is displaced, mm.
     pub before_mm: Vec3,
     /// Where it is now, mm.
     pub after_mm: Vec3,
@@ -49,7 +49,7 @@ pub struct Landmark {
     pub angle_deg: Option<BeforeAfter>,
 }
 
-/// A vessel's course at rest and displaced.
+/// A vessel's course, undisplaced and displaced.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Straightening {
     /// How far the point of the centre line is displaced that is displaced most, mm.

@@ -292,7 +292,7 @@ impl Shell {
         }
     }
 
-    /// Handles a change of the gamepad; a disconnected one is at rest.
+    /// Handles a change of the gamepad; a disconnected one is untouched.
     #[cfg(feature = "gamepad")]
     fn held(&mut self, now: Option<(String, endowire_play::Pad)>) {
         let (name, now) = now.unzip();
