@@ -17,8 +17,8 @@ let shown = true;
 /** When the oldest input came in that no picture shows. */
 let inputAt = null;
 let hidden = false, waits = false, stopped = false, choosing = false;
-/** Side of the pictures, how large they are shown, and the time of live frames of that side since it was chosen. */
-let side = 0, shownPx = 0, fit = { at: 0, frames: 0, ms: 0 };
+/** Side of the pictures, how large they are shown, and the quickest of the live frames of that side since it was chosen. */
+let side = 0, shownPx = 0, fit = { at: 0, frames: 0, ms: Infinity };
 let counted = { at: performance.now(), ticks: 0, live: 0 };
 
 /** The graphics processor, where the browser has one. */
@@ -84,10 +84,10 @@ async function choose(one) {
 /** Has pictures drawn as large as they are shown, if there is time. */
 function chooseSide(ms) {
   fit.frames += 1;
-  fit.ms += ms;
+  fit.ms = Math.min(fit.ms, ms);
   if (fit.frames < FIT_FRAMES || performance.now() - fit.at < FIT_MS || shownPx === 0) return;
-  const fitting = fittingSide(shownPx, side, fit.ms / fit.frames);
-  fit = { at: performance.now(), frames: 0, ms: 0 };
+  const fitting = fittingSide(shownPx, side, fit.ms);
+  fit = { at: performance.now(), frames: 0, ms: Infinity };
   if (fitting !== side) {
     side = fitting;
     session.showAt(side);
@@ -163,7 +163,7 @@ const asked = {
   async open({ files, path, side: asked }) {
     const made = new Session(files, path, asked);
     side = asked;
-    fit = { at: performance.now(), frames: 0, ms: 0 };
+    fit = { at: performance.now(), frames: 0, ms: Infinity };
     session?.free();
     session = made;
     if (isQuicker) {

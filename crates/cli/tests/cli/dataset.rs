@@ -278,7 +278,7 @@ fn what_a_script_injects_is_in_pictures_of_its_steps_and_later() {
     let tree = assets().join("vessels/curved_tube.csv");
     let view = format!(
         "[view]\nviews = [\"fluoro\"]\nsize_px = [64, 64]\nbackend = \"cpu\"\ndetector.noise = false\ndetector.lag = 0.0\n\
-         xray.window = [0.5, 6.0]\nflow.tree = {:?}\nc_arm = {{ primary_deg = 20.0, field_mm = 200.0 }}\n",
+         xray.window = [0.5, 6.0]\nxray.brightness_s = 0.0\nflow.tree = {:?}\nc_arm = {{ primary_deg = 20.0, field_mm = 200.0 }}\n",
         text(&tree)
     );
     let scene = |injects: &str| {

@@ -109,8 +109,8 @@ fn arch(folder: &Path, mode: &str, more: &[&str]) -> Vec<Vec<u8>> {
     let scene = assets().join("scenes/arch_angiography.toml");
     let out = folder.join(mode).join(more.join("_"));
     // What a frame shows without noise and without what is left of the one before it.
-    let still =
-        ["--set", "detector.noise=false", "--set", "detector.lag=0", "--size", "64", "--view", "fluoro"];
+    let still = ["detector.noise=false", "detector.lag=0", "xray.brightness_s=0"].map(|set| ["--set", set]).concat();
+    let still = [&still[..], &["--size", "64", "--view", "fluoro"]].concat();
     let scene = ["fluoro", text(&scene), "--steps", "0", "--mode", mode, "--out", text(&out), "--json"];
     let files = reported(&endowire(&[&scene[..], &still, more].concat()));
     let names = files["files"].as_array().unwrap().iter().filter_map(Value::as_str);
@@ -180,7 +180,7 @@ fn a_pulse_shows_the_way_of_a_device_in_a_run_and_afterwards_alike() {
     // A step is a fifteenth of a second; pulses last for 60 ms of it, and the tube's voltage follows the patient.
     let run = |name: &str, pulse_ms: &str| {
         let views = "views = [\"fluoro\"]\nexposure.current_ma = [0.1, 1000.0]\ndetector.lag = 0.0\nbits = 16\nc_arm = { field_mm = 30.0, isocentre_mm = [0.0, 0.0, 10.0] }";
-        let pulse = format!("contrast_fraction = 0.05\npulse_ms = {pulse_ms}");
+        let pulse = format!("contrast_fraction = 0.05\nbrightness_s = 0.0\npulse_ms = {pulse_ms}");
         let more = [("views = [\"3d\", \"fluoro\"]", views), ("contrast_fraction = 0.05", pulse.as_str())];
         let changes = [&SHORT[..], &more].concat();
         let path = folder.path().join(format!("{name}.toml"));

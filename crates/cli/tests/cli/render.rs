@@ -293,7 +293,7 @@ fn medium_from_a_tip_is_where_the_tip_was_whichever_frames_are_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let small = [
         ("size_px = [640, 640]", "size_px = [96, 96]\nbackend = \"cpu\"\ndetector = { lag = 0.0 }"),
-        ("mode = \"dsa\"", "mode = \"fluoro\""),
+        ("mode = \"dsa\"", "mode = \"fluoro\"\nbrightness_s = 0.0"),
         ("advance_mm = 160.0", "advance_mm = 80.0"),
         ("rate_ml_per_s = 20.0", "rate_ml_per_s = 20.0\nat_tip = true"),
     ];

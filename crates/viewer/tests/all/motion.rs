@@ -45,6 +45,8 @@ fn view(mode: Mode) -> ViewSpec {
     // The place of the C-arm is that of the vessel at rest, whatever its bounds are.
     view.c_arm.isocentre_mm = Some([0.0; 3]);
     view.detector = DetectorSpec { noise: false, lag: 0.0, ..DetectorSpec::default() };
+    // Nor is there anything else that remembers the frame before.
+    view.xray.brightness_s = 0.0;
     view
 }
 

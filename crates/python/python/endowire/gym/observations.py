@@ -251,5 +251,6 @@ class Fluoroscopy:
     def _view(self, primary_deg: float, secondary_deg: float) -> dict[str, Any]:
         view = {**self.view, "views": ["fluoro"], "size_px": list(self.size_px), "bits": 8}
         view["detector"] = {**view.get("detector", {}), "lag": 0.0}
+        view["xray"] = {**view.get("xray", {}), "brightness_s": 0.0}
         view["c_arm"] = {**view.get("c_arm", {}), "primary_deg": primary_deg, "secondary_deg": secondary_deg}
         return view

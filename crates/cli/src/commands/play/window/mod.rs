@@ -164,7 +164,7 @@ fn draw(
     mut writer: Writer,
     (proxy, to): (&EventLoopProxy<Event>, &Sender<Message>),
 ) -> live::Frames {
-    let mut fitted = Instant::now();
+    let (mut fitted, mut quickest_ms) = (Instant::now(), f64::INFINITY);
     live::draw(pictures, newest, |shown| {
         let size = [0, 1].map(|side| shared.size[side].load(Ordering::Relaxed));
         if size.contains(&0) {
@@ -173,8 +173,12 @@ fn draw(
         let gamepad = shared.gamepad.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let help = shared.help.load(Ordering::Relaxed).then(|| help(gamepad.is_some()));
         let canvas = screen::compose(&mut writer, shown, size, help.as_deref(), gamepad.as_deref());
-        if fitted.elapsed() > FIT_EVERY && fit(shown, size, to) {
-            fitted = Instant::now();
+        if let Some(frame_ms) = sharp_ms(shown) {
+            quickest_ms = quickest_ms.min(frame_ms);
+            if fitted.elapsed() > FIT_EVERY {
+                fit(shown, size, quickest_ms, to);
+                (fitted, quickest_ms) = (Instant::now(), f64::INFINITY);
+            }
         }
         let mut picture = shared.picture.lock().unwrap_or_else(PoisonError::into_inner);
         let unseen = picture.take().and_then(|before| before.input_at);
@@ -184,18 +188,21 @@ fn draw(
     })
 }
 
-/// Has live pictures drawn as large as they are shown, if there is time; returns whether there was a sharp one to tell by.
-fn fit(shown: &live::Shown<'_>, size: [usize; 2], to: &Sender<Message>) -> bool {
+/// Time that a sharp live picture has taken, ms.
+fn sharp_ms(shown: &live::Shown<'_>) -> Option<f64> {
     let lab = &shown.moment.snapshot.lab;
-    let side_px = lab.fluoro().size_px[0];
-    let sharp = shown.fluoro.first().is_some_and(|image| image.width() == side_px);
-    let Some(frame_ms) = shown.frame_ms.filter(|_| sharp && lab.is_live()) else { return false };
+    let sharp = shown.fluoro.first().is_some_and(|image| image.width() == lab.fluoro().size_px[0]);
+    shown.frame_ms.filter(|_| sharp && lab.is_live())
+}
+
+/// Has live pictures drawn as large as they are shown, if there is time: other programs make some of them slow.
+fn fit(shown: &live::Shown<'_>, size: [usize; 2], quickest_ms: f64, to: &Sender<Message>) {
+    let side_px = shown.moment.snapshot.lab.fluoro().size_px[0];
     let layout = Layout::of(size, screen::planes(&shown.moment.snapshot.readout));
-    let fitting = endowire_play::fitting_side(layout.side as u32, side_px, frame_ms);
+    let fitting = endowire_play::fitting_side(layout.side as u32, side_px, quickest_ms);
     if fitting != side_px {
         let _ = to.send(Message::Side(fitting));
     }
-    true
 }
 
 /// Writes the window for a state as a PNG file, at its initial size. It is drawn in memory, so no display is needed.
