@@ -18,6 +18,14 @@ impl Solid {
         match *self {}
     }
 
+    pub(super) fn common_mm3(&self, _: &Self) -> f64 {
+        match *self {}
+    }
+
+    pub(super) fn volume_mm3(&self) -> f64 {
+        match *self {}
+    }
+
     pub(super) fn triangles(&self) -> Closed {
         match *self {}
     }

@@ -6,13 +6,6 @@ use manifold_rust::types::{BooleanEngine, Error as Status, MeshGL64, OpType};
 use super::overlap::Closed;
 use crate::Vec3;
 
-impl Closed {
-    /// Whether it has a handle, as a ring: by Euler's characteristic V − E + F, of 2 without, with 3 F edges for every two triangles.
-    pub(super) fn is_ring(&self) -> bool {
-        2 * self.vertices_mm.len() < self.triangles.len() + 4
-    }
-}
-
 /// A closed part on its way through unions and differences.
 pub(super) struct Solid(Manifold);
 
