@@ -697,7 +697,8 @@ fn frame(unit_mm: f64, axes: Option<&str>) -> PyResult<SurfaceFrame> {
     Ok(SurfaceFrame { unit_mm, axes })
 }
 
-/// Checks a surface file as `endowire vessel check` does; returns a dictionary of the findings, and `sound`.
+/// Checks a surface file as `endowire vessel check` does; returns a dictionary of the findings, with `sound`, `faults`, and lines on what
+/// is `repaired` on loading, what is `kept`, and what `needs_you`.
 /// Arguments are as in `Vessel.read`: with `repair="none"` the surface is taken as it is, and `keep_open_mm` are places
 /// of holes that are meant. Septa thinner than `septum_mm` are counted.
 ///
@@ -721,5 +722,9 @@ pub(crate) fn check_vessel<'py>(
     .map_err(exception)?;
     let reported = document::write(py, &report)?;
     reported.set_item("sound", report.is_sound())?;
+    reported.set_item("faults", report.faults())?;
+    reported.set_item("repaired", report.repair.repaired())?;
+    reported.set_item("kept", report.repair.kept())?;
+    reported.set_item("needs_you", report.needs_you())?;
     Ok(reported)
 }

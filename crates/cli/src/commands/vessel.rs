@@ -24,6 +24,12 @@ pub(super) struct Document {
     sound: bool,
     /// Why it is not sound, a few words each.
     faults: Vec<String>,
+    /// What is repaired on loading, a line each.
+    repaired: Vec<String>,
+    /// What is unusual and is kept.
+    kept: Vec<String>,
+    /// What is left to mend.
+    needs_you: Vec<String>,
     #[serde(flatten)]
     report: CheckReport,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -122,6 +128,9 @@ pub(super) fn checked(
         file: file.display().to_string(),
         sound: faults.is_empty(),
         faults,
+        repaired: report.repair.repaired(),
+        kept: report.repair.kept(),
+        needs_you: report.needs_you(),
         report,
         felt,
     })
@@ -134,15 +143,13 @@ const OPENINGS_LISTED: usize = 20;
 pub(super) fn text(document: &Document) -> String {
     let r = &document.report;
     let size: Vec<String> = (0..3).map(|k| format!("{:.1}", r.high_mm[k] - r.low_mm[k])).collect();
-    let verdict = match (document.faults.join(", "), r.flat) {
+    let verdict = match (document.faults.join(", "), document.needs_you.is_empty()) {
         (faults, _) if faults.is_empty() => "sound".to_owned(),
-        (faults, true) => format!("faulty: {faults}: no device can be in it"),
-        (faults, false) if r.separate_pieces > 0 => {
-            format!(
-                "faulty: {faults}; what can be is repaired on loading, as told below, and pieces are not joined: unite them, or delete them"
-            )
+        (faults, _) if r.flat => format!("faulty: {faults}: no device can be in it"),
+        (faults, true) => format!("faulty: {faults}; it is repaired on loading, as told below"),
+        (faults, false) => {
+            format!("faulty: {faults}; loading does not mend all of it: see \"needs you\" below")
         }
-        (faults, false) => format!("faulty: {faults}; it is repaired on loading, as told below"),
     };
     let mut lines = vec![
         format!("{}: {verdict}", document.file),
@@ -188,6 +195,15 @@ pub(super) fn text(document: &Document) -> String {
         format!("  self-intersections   {at_least}{}", r.self_intersections),
     ]);
     lines.extend(r.intersecting_pairs.iter().map(|[a, b]| format!("    triangles {a} and {b}")));
+    let headed = [
+        ("repaired on loading:", &document.repaired),
+        ("kept as it is:", &document.kept),
+        ("needs you:", &document.needs_you),
+    ];
+    for (heading, told) in headed.into_iter().filter(|(_, told)| !told.is_empty()) {
+        lines.push(heading.to_owned());
+        lines.extend(told.iter().map(|line| format!("  {line}")));
+    }
     lines.extend(simulated(r));
     lines.extend(document.felt.iter().flat_map(FeltReport::text));
     lines.extend(r.hints.iter().map(|hint| format!("  {hint}")));
@@ -198,12 +214,6 @@ pub(super) fn text(document: &Document) -> String {
 fn simulated(r: &CheckReport) -> Vec<String> {
     let list = |v: &[f64; 3]| format!("[{:.2}, {:.2}, {:.2}]", v[0], v[1], v[2]);
     let mut lines = vec!["as it is simulated:".to_owned()];
-    let notes = r.repair.notes();
-    let repair = |text: String| format!("  repair               {text}");
-    match notes.is_empty() {
-        true => lines.push(repair("nothing to do".to_owned())),
-        false => lines.extend(notes.into_iter().map(repair)),
-    }
     if let Some(lumen) = &r.survey.lumen {
         lines.push(format!(
             "  half of the lumen    {:.3} mm at {}; one place in a hundred below {:.3}, one in twenty below {:.3}, median {:.3}",

@@ -44,6 +44,9 @@ fn holes_are_closed_unless_they_are_meant_or_nothing_is_repaired() {
     let (file, place) = tube(folder.path(), "hole.stl", 0.6, None);
     let at = format!("{},{},{}", place.x, place.y, place.z);
     assert_eq!(openings(&reported(&check(&file, &["--json"]))), 2);
+    let told = String::from_utf8(check(&file, &[]).stdout).unwrap();
+    assert!(told.contains("\nrepaired on loading:\n") && told.contains("1 holes and tears closed"), "{told}");
+    assert!(!told.contains("needs you"), "{told}");
     assert_eq!(openings(&reported(&check(&file, &["--json", "--keep-open", &at]))), 3);
     assert_eq!(openings(&reported(&check(&file, &["--json", "--repair", "none"]))), 3);
     let (whole, _) = tube(folder.path(), "whole.stl", 0.0, None);
@@ -66,6 +69,13 @@ fn a_sac_that_is_not_joined_is_no_sound_vessel() {
     let report = reported(&check(&file, &["--json"]));
     assert_eq!(report["sound"], false);
     assert!(report["faults"].to_string().contains("not joined to the vessel"), "{}", report["faults"]);
+    let told = String::from_utf8(check(&file, &[]).stdout).unwrap();
+    assert!(
+        told.lines()
+            .next()
+            .is_some_and(|line| line.ends_with("loading does not mend all of it: see \"needs you\" below"))
+    );
+    assert!(told.contains("\nneeds you:\n  1 closed pieces that are not joined to the vessel"), "{told}");
     let (alone, _) = tube(folder.path(), "alone.stl", 0.0, None);
     assert_eq!(reported(&check(&alone, &["--json"]))["sound"], true, "the twin");
 }

@@ -7,7 +7,7 @@ use super::survey::{Survey, survey};
 use super::topology::EdgeTable;
 use super::wall::{duplicate_pairs, flat_volume_mm3};
 use super::weld::Welding;
-use super::{RepairOptions, RepairReport, SurfaceMesh, Wall, opening, repair, sliver};
+use super::{RepairKind, RepairOptions, RepairReport, SurfaceMesh, Wall, opening, sliver};
 use crate::{Error, Result};
 
 /// Number of intersecting pairs named in a report; a list of thousands would not help.
@@ -54,8 +54,8 @@ pub struct CheckReport {
     pub inlet: Option<usize>,
     /// Pairs of openings of similar size that face each other within a radius: a vessel that is cut through there.
     pub facing_openings: Vec<[usize; 2]>,
-    /// Closed pieces of the repaired wall inside another piece, among its eight largest: volumes are added, and a device
-    /// between the two is in the outer one.
+    /// Pieces of the repaired wall inside another one, or through its openings, among its eight largest: volumes are added, and a
+    /// device between the two is in the outer one. What is taken as a wall in the lumen does not count.
     pub nested_pieces: usize,
     /// Closed pieces of the repaired wall beside a vessel with openings, among its eight largest: nothing can get into them, as
     /// into a sac that is not joined to its artery.
@@ -117,6 +117,17 @@ impl CheckReport {
         self.faults().is_empty()
     }
 
+    /// What is left to mend after the repair on loading, a sentence each.
+    pub fn needs_you(&self) -> Vec<String> {
+        let flat = self
+            .flat
+            .then(|| "the surface encloses no volume, as a sheet: no device can be in it".to_owned());
+        let facing = self.facing_openings.iter().map(|[i, j]| {
+            format!("openings {i} and {j} face each other: the vessel is cut through there; join its parts")
+        });
+        flat.into_iter().chain(self.repair.left()).chain(facing).collect()
+    }
+
     /// Why it is not sound: a few words for each kind of fault, with the number of such faults.
     pub fn faults(&self) -> Vec<String> {
         let counts = [
@@ -124,15 +135,23 @@ impl CheckReport {
             (self.flipped_triangles, "flipped triangle", "flipped triangles"),
             (self.degenerate_triangles, "triangle without area", "triangles without area"),
             (self.duplicate_triangles, "duplicate triangle", "duplicate triangles"),
-            (self.self_intersections, "self-intersection", "self-intersections"),
+            (
+                self.self_intersections.max(self.repair.intersections_left),
+                "self-intersection",
+                "self-intersections",
+            ),
             (self.stray_edges, "stray open edge", "stray open edges"),
             (self.repair.edges_sewn, "edge along a crack", "edges along cracks"),
+            (self.repair.cracks_closed, "vertex beside a crack", "vertices beside cracks"),
+            (self.repair.holes_filled, "hole", "holes"),
+            (self.repair.pieces_dropped, "piece that is no vessel", "pieces that are no vessels"),
+            (self.repair.skins_dropped, "outer skin of a double wall", "outer skins of a double wall"),
             (
                 self.facing_openings.len(),
                 "pair of openings that face each other",
                 "pairs of openings that face each other",
             ),
-            (self.nested_pieces, "closed piece inside another", "closed pieces inside another"),
+            (self.nested_pieces, "piece inside another", "pieces inside another"),
             (
                 self.separate_pieces,
                 "closed piece that is not joined to the vessel",
@@ -210,8 +229,8 @@ pub fn check_repaired(
         && volume_mm3 > rounding_mm3;
     let hints = hints(&wall, &survey, (high - low).norm(), unit_mm);
     let non_manifold_edges = table.non_manifold();
-    let [nested_pieces, separate_pieces] =
-        repair::nested_and_apart(wall.mesh(), &EdgeTable::new(&wall.mesh().triangles));
+    let number = |kind: RepairKind| repair.repairs.iter().filter(|repair| repair.kind == kind).count();
+    let (nested_pieces, separate_pieces) = (number(RepairKind::PieceNested), number(RepairKind::PieceApart));
     Ok(CheckReport {
         triangles: surface.triangles.len(),
         vertices: surface.vertices_mm.len() - merged,

@@ -44,7 +44,7 @@ impl<'a> Ends<'a> {
         let reach_mm = ASIDE * opening.radius_mm;
         for t in 0..self.mesh.triangles.len() {
             let corners = self.mesh.corners(t);
-            let middle = corners.iter().sum::<Vec3>() / 3.0;
+            let middle = self.mesh.middle(t);
             let size_mm = corners.iter().map(|x| (x - middle).norm()).fold(0.0, f64::max);
             let (along, lateral) = opening.beyond_and_off_axis_mm(&middle);
             let within = -reach_mm - size_mm..=opening.beyond_mm + 2.0 * reach_mm + size_mm;

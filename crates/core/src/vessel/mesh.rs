@@ -19,6 +19,11 @@ impl SurfaceMesh {
         self.triangles[index].map(|v| self.vertices_mm[v as usize])
     }
 
+    /// The middle of triangle `index`.
+    pub(crate) fn middle(&self, index: usize) -> Vec3 {
+        self.corners(index).iter().sum::<Vec3>() / 3.0
+    }
+
     /// The six faces of a box between two corners, in cells of about `cell_mm`, facing outwards. Faces share no
     /// vertices; weld them if needed.
     pub fn cuboid(low: Vec3, high: Vec3, cell_mm: f64) -> Self {

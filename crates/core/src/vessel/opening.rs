@@ -115,6 +115,21 @@ impl Opening {
         (0..self.boundary.len()).map(move |k| [at(k), at(k + 1), self.centre_mm])
     }
 
+    /// Adds a stretch of wall to the mesh of the opening, straight on for `by_mm`; the opening at its end.
+    pub(super) fn drawn_out(&self, mesh: &mut SurfaceMesh, by_mm: f64) -> Self {
+        let way = self.direction * by_mm;
+        let first = mesh.vertices_mm.len() as u32;
+        let ring: Vec<Vec3> = self.boundary.iter().map(|v| mesh.vertices_mm[*v as usize] + way).collect();
+        let boundary: Vec<u32> = (first..).take(ring.len()).collect();
+        mesh.vertices_mm.extend(ring);
+        for k in 0..boundary.len() {
+            let next = (k + 1) % boundary.len();
+            let (a, b) = (self.boundary[k], self.boundary[next]);
+            mesh.triangles.extend([[a, b, boundary[next]], [a, boundary[next], boundary[k]]]);
+        }
+        Self { boundary, centre_mm: self.centre_mm + way, ..self.clone() }
+    }
+
     /// Adds that fan to the mesh of the opening; it shares the loop's vertices.
     pub(crate) fn close(&self, mesh: &mut SurfaceMesh) {
         let centre = mesh.vertices_mm.len() as u32;

@@ -66,6 +66,8 @@ pub enum RepairKind {
     HoleKept,
     /// Intersecting or folded triangles cut out and replaced.
     FoldReplaced,
+    /// Vessels that grazed each other without being joined: their walls, moved apart.
+    MovedApart,
     /// Triangles that still intersect.
     StillCrossing,
     /// A closed body in the lumen, taken as a wall.
@@ -76,6 +78,28 @@ pub enum RepairKind {
     PartUnited,
     /// A closed body or a sheet that stands in the wall, of which most is in the lumen, taken off it.
     BodyInWall,
+    /// A piece that lies inside another one, left there.
+    PieceNested,
+    /// A closed piece beside a vessel with openings, not joined to it, left there.
+    PieceApart,
+}
+
+/// What becomes of a kind of fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Treatment {
+    Mended,
+    Kept,
+    Left,
+}
+
+impl RepairKind {
+    pub(super) fn treatment(self) -> Treatment {
+        match self {
+            Self::HoleKept | Self::BodyInLumen | Self::SheetInLumen => Treatment::Kept,
+            Self::StillCrossing | Self::PieceNested | Self::PieceApart => Treatment::Left,
+            _ => Treatment::Mended,
+        }
+    }
 }
 
 /// One repaired place, or one thing in the lumen.

@@ -90,7 +90,7 @@ pub fn survey(wall: &Wall, septum_mm: f64) -> Result<Survey> {
     let mut septa =
         SeptaReport { below_mm: septum_mm, asked: 0, thin: 0, thinnest_mm: None, thinnest_at_mm: None };
     for t in (0..mesh.triangles.len()).step_by(every) {
-        let (at, inward) = (middle(wall, t), query.inward_normal(t as u32));
+        let (at, inward) = (wall.mesh().middle(t), query.inward_normal(t as u32));
         septa.asked += 1;
         if let Some(half) = half_chord(&query, (at, inward), size_mm) {
             chords.push((half, at + inward * half));
@@ -121,10 +121,6 @@ pub fn survey(wall: &Wall, septum_mm: f64) -> Result<Survey> {
     Ok(Survey { lumen, septa, start })
 }
 
-fn middle(wall: &Wall, triangle: usize) -> Vec3 {
-    wall.mesh().corners(triangle).iter().sum::<Vec3>() / 3.0
-}
-
 /// Half the distance from a position on the wall along its inward normal to the opposite wall, mm.
 fn half_chord(query: &WallQuery, (at, inward): (Vec3, Vec3), size_mm: f64) -> Option<f64> {
     let off_mm = OFF * size_mm;
@@ -146,7 +142,7 @@ pub(super) fn median_half_lumen_mm(wall: &Wall) -> Result<Option<f64>> {
     let size_mm = mesh.used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
     let every = mesh.triangles.len().div_ceil(FEW_SAMPLES).max(1);
     let asked = (0..mesh.triangles.len()).step_by(every);
-    let place = |t: usize| (middle(wall, t), query.inward_normal(t as u32));
+    let place = |t: usize| (wall.mesh().middle(t), query.inward_normal(t as u32));
     let mut chords: Vec<f64> = asked.filter_map(|t| half_chord(&query, place(t), size_mm)).collect();
     chords.sort_by(f64::total_cmp);
     Ok(chords.get(chords.len().saturating_sub(1) / 2).copied())

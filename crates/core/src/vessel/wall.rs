@@ -5,7 +5,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use super::in_front::Ends;
 use super::mesh::retain_numbered;
 use super::opening::{self, Boundary, Opening};
-use super::repairs::{Repair, RepairKind, RepairMode, RepairOptions, named};
+use super::repairs::{Repair, RepairKind, RepairMode, RepairOptions, Treatment, named};
 pub(crate) use super::topology::NONE as NO_NEIGHBOUR;
 use super::topology::{EdgeTable, EdgeUse, Edges};
 use super::weld::Welding;
@@ -95,6 +95,8 @@ pub struct RepairReport {
     pub intersections_capped: bool,
     /// Triangles cut out because they intersected or were folded.
     pub fold_triangles_removed: usize,
+    /// Triangles of vessels that grazed each other, moved apart.
+    pub triangles_moved_apart: usize,
     /// Closed bodies in the lumen, taken as walls.
     pub bodies_in_lumen: usize,
     /// Sheets in the lumen, taken as thin walls with two sides.
@@ -124,6 +126,7 @@ impl RepairReport {
             self.triangles_added,
             self.intersections_found,
             self.fold_triangles_removed,
+            self.triangles_moved_apart,
             self.bodies_in_lumen,
             self.sheets_in_lumen,
             self.parts_united,
@@ -132,12 +135,60 @@ impl RepairReport {
         more.iter().all(|count| *count == 0) && !self.intersections_capped
     }
 
-    /// One line for each kind of what was repaired on the surface, and of what in its lumen was taken as a wall, with
-    /// sizes and places of the largest; empty for a surface that is taken as it was given.
+    /// One line for each kind of what was repaired on the surface, of what in its lumen was taken as a wall, and of what is
+    /// left to mend, with sizes and places of the largest; empty for a surface that is taken as it was given.
     pub fn repair_notes(&self) -> Vec<String> {
+        self.lines().into_iter().map(|(_, line)| line).collect()
+    }
+
+    /// One line for each kind of change.
+    pub fn repaired(&self) -> Vec<String> {
+        let counted = [
+            (self.vertices_welded, "duplicate vertices welded"),
+            (self.vertices_unreferenced, "unused vertices dropped"),
+            (self.degenerate_removed, "degenerate triangles removed"),
+            (self.duplicates_removed, "duplicate triangles removed"),
+            (self.triangles_flipped, "triangles turned over"),
+        ];
+        lines_of(&counted).chain(self.of_treatment(Treatment::Mended)).collect()
+    }
+
+    /// One line for each kind of what is unusual and was kept.
+    pub fn kept(&self) -> Vec<String> {
+        let pieces = (self.components > 1).then(|| {
+            format!(
+                "{} separate pieces, the smallest of {} triangles",
+                self.components, self.smallest_component
+            )
+        });
+        self.of_treatment(Treatment::Kept).chain(pieces).collect()
+    }
+
+    /// One line for each kind of fault that is left.
+    pub fn left(&self) -> Vec<String> {
+        let counted = [
+            (self.stray_edges, "open edges form no loop"),
+            (self.non_manifold_edges, "edges belong to more than two triangles"),
+            (self.one_sided_edges, "edges make the surface one-sided"),
+        ];
+        self.of_treatment(Treatment::Left).chain(lines_of(&counted)).collect()
+    }
+
+    /// One line per change or irregularity; empty for a clean surface.
+    pub fn notes(&self) -> Vec<String> {
+        [self.repaired(), self.kept(), self.left()].concat()
+    }
+
+    fn of_treatment(&self, treatment: Treatment) -> impl Iterator<Item = String> {
+        let those = self.lines().into_iter().filter(move |(kind, _)| kind.treatment() == treatment);
+        those.map(|(_, line)| line)
+    }
+
+    /// A line for each kind of repair that there is, with places.
+    fn lines(&self) -> Vec<(RepairKind, String)> {
         let at_least = if self.intersections_capped { "or more " } else { "" };
         let still = format!("{at_least}pairs of triangles still intersect: mend the surface there");
-        let kept = self.repairs.iter().filter(|repair| repair.kind == RepairKind::HoleKept).count();
+        let number = |kind: RepairKind| self.repairs.iter().filter(|repair| repair.kind == kind).count();
         let lines = [
             (self.cracks_closed, RepairKind::CrackJoined, "vertices merged over cracks"),
             (self.edges_sewn, RepairKind::SeamSewn, "edges sewn to vertices of the other side of a seam"),
@@ -147,7 +198,11 @@ impl RepairReport {
                 "triangles of fins, second layers and membranes removed",
             ),
             (self.edges_cut, RepairKind::EdgeCut, "edges of more than two triangles cut apart"),
-            (self.pieces_dropped, RepairKind::PieceDropped, "small or flat pieces dropped"),
+            (
+                self.pieces_dropped,
+                RepairKind::PieceDropped,
+                "pieces that are small, flat or on the wall dropped",
+            ),
             (
                 self.skins_dropped,
                 RepairKind::SkinDropped,
@@ -170,42 +225,40 @@ impl RepairReport {
                 "bodies and sheets that stand in the wall, taken off the lumen",
             ),
             (self.holes_filled, RepairKind::HoleClosed, "holes and tears closed"),
-            (kept, RepairKind::HoleKept, "holes left open as asked"),
+            (number(RepairKind::HoleKept), RepairKind::HoleKept, "holes left open as asked"),
             (
                 self.fold_triangles_removed,
                 RepairKind::FoldReplaced,
                 "intersecting or folded triangles cut out and replaced",
             ),
+            (
+                self.triangles_moved_apart,
+                RepairKind::MovedApart,
+                "triangles of vessels that graze each other moved apart: they stay two",
+            ),
             (self.intersections_left, RepairKind::StillCrossing, &still),
+            (
+                number(RepairKind::PieceNested),
+                RepairKind::PieceNested,
+                "pieces inside another one: a device is in the inner or the outer lumen; delete one of the two",
+            ),
+            (
+                number(RepairKind::PieceApart),
+                RepairKind::PieceApart,
+                "closed pieces that are not joined to the vessel, so nothing gets into them: unite them with it, or delete them",
+            ),
         ];
         let line = |(count, kind, text): (usize, RepairKind, &str)| match named(&self.repairs, kind) {
-            places if places.is_empty() => format!("{count} {text}"),
-            places => format!("{count} {text}: {places}"),
+            places if places.is_empty() => (kind, format!("{count} {text}")),
+            places => (kind, format!("{count} {text}: {places}")),
         };
         lines.into_iter().filter(|(count, ..)| *count > 0).map(line).collect()
     }
+}
 
-    /// One line per change or irregularity; empty for a clean surface.
-    pub fn notes(&self) -> Vec<String> {
-        let mut notes = Vec::new();
-        let counted = |count: usize, text: &str| (count > 0).then(|| format!("{count} {text}"));
-        notes.extend(counted(self.vertices_welded, "duplicate vertices welded"));
-        notes.extend(counted(self.vertices_unreferenced, "unused vertices dropped"));
-        notes.extend(counted(self.degenerate_removed, "degenerate triangles removed"));
-        notes.extend(counted(self.duplicates_removed, "duplicate triangles removed"));
-        notes.extend(counted(self.triangles_flipped, "triangles turned over"));
-        notes.extend(self.repair_notes());
-        notes.extend(counted(self.stray_edges, "open edges form no loop"));
-        notes.extend(counted(self.non_manifold_edges, "edges belong to more than two triangles"));
-        notes.extend(counted(self.one_sided_edges, "edges make the surface one-sided"));
-        if self.components > 1 {
-            notes.push(format!(
-                "{} separate pieces, the smallest of {} triangles",
-                self.components, self.smallest_component
-            ));
-        }
-        notes
-    }
+/// A line for each number that is not 0.
+fn lines_of(counted: &[(usize, &str)]) -> impl Iterator<Item = String> {
+    counted.iter().filter(|(count, _)| *count > 0).map(|(count, text)| format!("{count} {text}"))
 }
 
 impl Wall {
@@ -321,6 +374,7 @@ impl Wall {
             Some(places) => repair::cure(&mut mesh, &mut edges, tolerance_mm, places, &mut report)?,
             None => repair::turn_bodies(&mut mesh, &mut edges),
         }
+        report.repairs.extend(repair::nested_and_apart(&mesh, edges.of(&mesh.triangles)));
         Ok((mesh, edges, report))
     }
 

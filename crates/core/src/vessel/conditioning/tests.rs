@@ -67,7 +67,7 @@ fn uneven_tube(seed: u64) -> SurfaceMesh {
 /// Largest distance of vertices and centres of triangles from the true tube.
 fn off_tube(mesh: &SurfaceMesh) -> f64 {
     let off = |v: &Vec3| (v.x.hypot(v.y) - 2.0).abs();
-    let centre = |i: usize| mesh.corners(i).iter().sum::<Vec3>() / 3.0;
+    let centre = |i: usize| mesh.middle(i);
     let centres = (0..mesh.triangles.len()).map(|i| off(&centre(i)));
     mesh.vertices_mm.iter().map(off).chain(centres).fold(0.0, f64::max)
 }

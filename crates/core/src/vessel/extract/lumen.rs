@@ -142,15 +142,14 @@ impl<'a> Lumen<'a> {
     /// Marks the triangles around one, within `reach_mm` and at most twice that long, as seen.
     fn see_around(&self, triangle: usize, reach_mm: f64, is_seen: &mut [bool]) {
         let mesh = self.wall.mesh();
-        let middle = |t: usize| mesh.corners(t).iter().sum::<Vec3>() / 3.0;
-        let from = middle(triangle);
+        let from = mesh.middle(triangle);
         let mut open = vec![triangle];
         while let Some(t) = open.pop() {
             for next in
                 self.across[t].into_iter().filter(|next| *next != NO_NEIGHBOUR).map(|next| next as usize)
             {
                 if !is_seen[next]
-                    && (middle(next) - from).norm() <= reach_mm
+                    && (mesh.middle(next) - from).norm() <= reach_mm
                     && longest_mm(&mesh.corners(next)) <= 2.0 * reach_mm
                 {
                     is_seen[next] = true;

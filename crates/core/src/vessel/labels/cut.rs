@@ -121,7 +121,7 @@ pub(super) fn cut(
     voxel_mm: f64,
 ) -> std::result::Result<(), String> {
     let nearest = (0..mesh.triangles.len() as u32).min_by(|a, b| {
-        let distance = |t: u32| (mesh.corners(t as usize).iter().sum::<Vec3>() / 3.0 - outermost_mm).norm();
+        let distance = |t: u32| (mesh.middle(t as usize) - outermost_mm).norm();
         distance(*a).total_cmp(&distance(*b))
     });
     let across = EdgeTable::new(&mesh.triangles).neighbours(mesh.triangles.len());

@@ -32,12 +32,8 @@ pub(super) fn share_of(mesh: &SurfaceMesh, triangles: &[usize], is_there: impl F
     let asked = count.min(ASKED);
     let spread =
         |k: usize| if asked == count { k } else { ((k as f64 * STRIDE).fract() * count as f64) as usize };
-    let there = (0..asked).filter(|k| is_there(&middle(mesh, triangles[spread(*k)]))).count();
+    let there = (0..asked).filter(|k| is_there(&mesh.middle(triangles[spread(*k)]))).count();
     there as f64 / asked.max(1) as f64
-}
-
-fn middle(mesh: &SurfaceMesh, triangle: usize) -> Vec3 {
-    mesh.corners(triangle).iter().sum::<Vec3>() / 3.0
 }
 
 /// What a piece in the lumen is.
@@ -65,6 +61,11 @@ impl LumenOf {
         self.query.nearest(x, f64::MAX).is_some_and(|near| near.distance_mm > 0.0 && !near.rim)
     }
 
+    /// Whether a position is in it or on its wall, but for rounding.
+    pub(super) fn touches(&self, x: &Vec3, rounding_mm: f64) -> bool {
+        self.query.nearest(x, f64::MAX).is_some_and(|near| near.distance_mm > -rounding_mm && !near.rim)
+    }
+
     /// Distance of a position in it from its wall, mm; 0 outside.
     pub(super) fn depth_mm(&self, x: &Vec3) -> f64 {
         self.query.nearest(x, f64::MAX).filter(|near| !near.rim).map_or(0.0, |near| near.distance_mm.max(0.0))
@@ -73,7 +74,7 @@ impl LumenOf {
     /// The greatest distance of a triangle of a piece, by its middle, from the wall around this lumen, mm.
     pub(super) fn deepest_mm(&self, mesh: &SurfaceMesh, piece_of: &[u32], piece: usize) -> f64 {
         let own = (0..piece_of.len()).filter(|t| piece_of[*t] as usize == piece);
-        own.map(|t| self.depth_mm(&middle(mesh, t))).fold(0.0, f64::max)
+        own.map(|t| self.depth_mm(&mesh.middle(t))).fold(0.0, f64::max)
     }
 
     /// How much of each of these pieces is in it, by some of their triangles.

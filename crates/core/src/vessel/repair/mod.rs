@@ -10,7 +10,10 @@ mod divide;
 mod doubles;
 mod fill;
 mod folds;
+mod grazing;
 mod holes;
+#[cfg(test)]
+mod layers_tests;
 mod overlap;
 #[cfg(test)]
 mod overlap_tests;
@@ -73,9 +76,10 @@ pub(super) fn join_sheets(
     report: &mut RepairReport,
 ) {
     let noted = &mut report.repairs;
-    (report.pieces_dropped, report.piece_triangles_dropped) =
-        doubles::drop_doubles(mesh, edges.of(&mesh.triangles), noted);
-    if report.pieces_dropped > 0 {
+    let doubles = doubles::drop_doubles(mesh, edges.of(&mesh.triangles), noted);
+    (report.pieces_dropped, report.skins_dropped) = (doubles.patches, doubles.skins);
+    report.piece_triangles_dropped = doubles.triangles;
+    if doubles.triangles > 0 {
         edges.changed();
     }
     report.cracks_closed = cracks::close_cracks(mesh, edges.of(&mesh.triangles), noted);
@@ -92,8 +96,7 @@ pub(super) fn join_sheets(
     let resolved = sheets::resolve(mesh, edges, &mut report.repairs);
     report.sheets_removed = resolved.removed;
     report.edges_cut = resolved.cut;
-    if report.pieces_dropped + report.cracks_closed + report.edges_sewn + resolved.removed + resolved.cut > 0
-    {
+    if doubles.triangles + report.cracks_closed + report.edges_sewn + resolved.removed + resolved.cut > 0 {
         edges.changed();
         drop_unreferenced(mesh);
     }
@@ -118,7 +121,7 @@ pub(super) fn cure(
         edges.changed();
     }
     report.pieces_dropped += dropped.specks;
-    report.skins_dropped = dropped.skins;
+    report.skins_dropped += dropped.skins;
     report.piece_triangles_dropped += dropped.triangles;
     let filled = holes::fill_holes(mesh, edges.of(&mesh.triangles), keep_open_mm, noted)?;
     report.holes_filled = filled.holes;
@@ -148,9 +151,12 @@ pub(super) fn cure(
         drop_unreferenced(mesh);
         found = folds::find(mesh, tolerance_mm);
     }
+    let before = found.pairs.len();
+    let parted = grazing::part(mesh, tolerance_mm, &mut found, noted);
+    report.triangles_moved_apart = parted.moved;
     let cured = folds::cure(mesh, tolerance_mm, found, noted);
-    report.intersections_found = cured.found;
-    report.intersections_left = cured.left;
+    report.intersections_found = before;
+    report.intersections_left = cured.left + parted.left;
     report.intersections_capped = cured.capped;
     report.fold_triangles_removed += cured.removed;
     report.triangles_added += cured.added;

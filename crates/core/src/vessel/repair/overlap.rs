@@ -11,7 +11,7 @@ use super::holes::Rim;
 use super::solid::Solid;
 use crate::vessel::crossings::Crossings;
 use crate::vessel::mesh::retain_numbered;
-use crate::vessel::opening::{self, Boundary};
+use crate::vessel::opening::{self, Boundary, Opening};
 use crate::vessel::repairs::{Repair, RepairKind, of_groups};
 use crate::vessel::topology::{DisjointSets, EdgeTable};
 use crate::vessel::wall::signed_volume;
@@ -23,6 +23,12 @@ use crate::{Error, Result, Vec3};
 const DEEP: f64 = 0.25;
 /// Part of a rim that must lie in another part for a vessel that begins there.
 const BEGINS: f64 = 0.5;
+/// How far a mouth that lies partly in another vessel may be short of ending in it, in its radii, and the steps that are tried:
+/// one cut square off a branch at 30° is short by 3.5.
+const SHORT: f64 = 4.0;
+const STEPS: usize = 32;
+/// Distance from a wall that is rounding, relative to a mouth's radius.
+const ROUNDED: f64 = 1e-6;
 /// Part of a cap that must be left for an opening.
 const OPEN: f64 = 0.5;
 /// Part of the volume of a closed piece that must be in a lumen for a body in the wall.
@@ -50,6 +56,8 @@ pub(super) struct Overlaps {
     pieces: Vec<Piece>,
     boundary: Boundary,
     pairs: BTreeSet<(u32, u32)>,
+    /// How far each opening is drawn out to end in another piece, mm.
+    drawn_out_mm: Vec<f64>,
 }
 
 /// One connected piece.
@@ -96,7 +104,8 @@ impl Overlaps {
         }
         let boundary = opening::boundary(mesh, table);
         let pieces = measured(mesh, table, &piece_of, count, &boundary);
-        let mut overlaps = Self { piece_of, pieces, boundary, pairs: BTreeSet::new() };
+        let drawn_out_mm = vec![0.0; boundary.openings.len()];
+        let mut overlaps = Self { piece_of, pieces, boundary, pairs: BTreeSet::new(), drawn_out_mm };
         let between = |pair: &[u32; 2]| {
             let [a, b] = pair.map(|t| overlaps.piece_of[t as usize]);
             let are_parts = [a, b].iter().all(|p| overlaps.pieces[*p as usize].is_part);
@@ -104,7 +113,7 @@ impl Overlaps {
         };
         let crossing: BTreeSet<(u32, u32)> = found.pairs.iter().filter_map(between).collect();
         let mut lumens: BTreeMap<u32, Option<LumenOf>> = BTreeMap::new();
-        let mut pairs = BTreeSet::new();
+        let (mut pairs, mut drawn_out) = (BTreeSet::new(), Vec::new());
         for (a, b) in overlaps.near().into_iter().chain(crossing.iter().copied()) {
             for piece in [a, b] {
                 lumens.entry(piece).or_insert_with(|| LumenOf::new(mesh, |t| overlaps.piece_of[t] == piece));
@@ -112,14 +121,23 @@ impl Overlaps {
             let lumen = |piece: u32| lumens.get(&piece).and_then(Option::as_ref);
             let is_begun = |of: u32, within: u32| lumen(within).is_some_and(|l| overlaps.begins(mesh, of, l));
             let has_closed = [a, b].iter().any(|p| overlaps.pieces[*p as usize].loops == 0);
+            let short = [(a, b), (b, a)].map(|(of, within)| {
+                lumen(within).map_or_else(Vec::new, |l| overlaps.short_mouths(mesh, of, l))
+            });
             let joined = is_begun(a, b)
                 || is_begun(b, a)
+                || short.iter().any(|short| !short.is_empty())
                 || crossing.contains(&(a, b))
                     && (has_closed
                         || [(a, b), (b, a)].iter().any(|(p, q)| overlaps.is_deep(mesh, *p, *q, lumen(*q))));
             if joined {
                 pairs.insert((a, b));
+                drawn_out.extend(short.into_iter().flatten());
             }
+        }
+        for (opening, by_mm) in drawn_out {
+            let longest_mm = &mut overlaps.drawn_out_mm[opening];
+            *longest_mm = longest_mm.max(by_mm);
         }
         overlaps.pairs = pairs;
         (!overlaps.pairs.is_empty()).then_some(overlaps)
@@ -152,6 +170,26 @@ impl Overlaps {
             let inside = opening.boundary.iter().filter(|v| lumen.holds(&mesh.vertices_mm[**v as usize]));
             inside.count() as f64 >= BEGINS * opening.boundary.len() as f64
         })
+    }
+
+    /// The openings of piece `of` that lie partly in a lumen and would end in it if they were a little longer, and by how much,
+    /// mm.
+    fn short_mouths(&self, mesh: &SurfaceMesh, of: u32, lumen: &LumenOf) -> Vec<(usize, f64)> {
+        let short_by_mm = |opening: &Opening| {
+            let inside = |by_mm: f64| {
+                let at = |v: &u32| mesh.vertices_mm[*v as usize] + opening.direction * by_mm;
+                opening.boundary.iter().filter(|v| lumen.holds(&at(v))).count()
+            };
+            let all = opening.boundary.len();
+            let by_mm = |step: usize| SHORT * opening.radius_mm * step as f64 / STEPS as f64;
+            let rounding_mm = ROUNDED * opening.radius_mm;
+            let mut rim = opening.boundary.iter().map(|v| &mesh.vertices_mm[*v as usize]);
+            let is_partly = inside(0.0) < all && rim.any(|x| lumen.touches(x, rounding_mm));
+            is_partly.then(|| (1..=STEPS).map(by_mm).find(|mm| inside(*mm) == all)).flatten()
+        };
+        let openings = self.boundary.openings.iter().zip(&self.boundary.first_triangle).enumerate();
+        let own = openings.filter(|(_, (_, triangle))| self.piece_of[**triangle as usize] == of);
+        own.filter_map(|(number, (opening, _))| Some((number, short_by_mm(opening)?))).collect()
     }
 
     /// Whether piece `of` reaches far into the lumen of another one.
@@ -263,10 +301,20 @@ impl Overlaps {
         let caps = mesh.triangles.len() as u32;
         let openings = self.boundary.openings.iter().zip(&self.boundary.first_triangle);
         for (number, (opening, triangle)) in (0..).zip(openings) {
-            if self.piece_of[*triangle as usize] == piece {
-                opening.close(&mut closed);
-                numbers.resize(closed.triangles.len(), caps + number);
+            if self.piece_of[*triangle as usize] != piece {
+                continue;
             }
+            let by_mm = self.drawn_out_mm[number as usize];
+            if by_mm > 0.0 {
+                let drawn_out = opening.drawn_out(&mut closed, by_mm);
+                // Triangles of one number would be taken for a flat face.
+                let new = caps + self.boundary.openings.len() as u32..;
+                numbers.extend(new.take(closed.triangles.len() - numbers.len()));
+                drawn_out.close(&mut closed);
+            } else {
+                opening.close(&mut closed);
+            }
+            numbers.resize(closed.triangles.len(), caps + number);
         }
         crate::vessel::wall::drop_unreferenced(&mut closed);
         Closed {
@@ -279,17 +327,21 @@ impl Overlaps {
     fn opened(&self, mesh: &SurfaceMesh, mut whole: Closed) -> Closed {
         let caps = mesh.triangles.len() as u32;
         let area = |t: &[u32; 3]| mesh::area(&t.map(|v| whole.vertices_mm[v as usize]));
-        let mut left_mm2 = vec![0.0; self.boundary.openings.len()];
-        for (triangle, number) in whole.triangles.iter().filter(|(_, number)| *number >= caps) {
-            left_mm2[(number - caps) as usize] += area(triangle);
+        let openings = &self.boundary.openings;
+        let opening_of =
+            |number: u32| number.checked_sub(caps).map(|n| n as usize).filter(|n| *n < openings.len());
+        let mut left_mm2 = vec![0.0; openings.len()];
+        for (triangle, number) in &whole.triangles {
+            if let Some(opening) = opening_of(*number) {
+                left_mm2[opening] += area(triangle);
+            }
         }
-        let is_open = |number: u32| {
-            let opening = (number - caps) as usize;
-            let full_mm2: f64 = self.boundary.openings[opening].cap(mesh).map(|cap| mesh::area(&cap)).sum();
+        let is_open = |opening: usize| {
+            let full_mm2: f64 = openings[opening].cap(mesh).map(|cap| mesh::area(&cap)).sum();
             left_mm2[opening] > OPEN * full_mm2
         };
-        let open: Vec<bool> = (0..left_mm2.len() as u32).map(|number| is_open(caps + number)).collect();
-        whole.triangles.retain(|(_, number)| *number < caps || !open[(*number - caps) as usize]);
+        let open: Vec<bool> = (0..openings.len()).map(is_open).collect();
+        whole.triangles.retain(|(_, number)| opening_of(*number).is_none_or(|opening| !open[opening]));
         whole
     }
 

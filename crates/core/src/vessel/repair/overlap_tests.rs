@@ -92,6 +92,11 @@ fn a_sac_that_overlaps_its_artery_is_joined_and_one_apart_is_none() {
         } else {
             let refused = sac.unwrap_err().to_string();
             assert!(refused.contains("is not joined to the artery"), "{refused}");
+            let told = wall.report().repair_notes();
+            assert!(
+                told.len() == 1 && told[0].starts_with("1 closed pieces that are not joined"),
+                "{told:?}"
+            );
         }
     }
 }
@@ -152,6 +157,70 @@ fn vessels_that_graze_each_other_stay_two() {
     let wall = Wall::from_surface(&mesh).unwrap();
     assert_eq!((wall.report().parts_united, wall.report().components), (0, 2), "{:?}", wall.report().notes());
     assert!(!check(&mesh).unwrap().is_sound());
+}
+
+/// Side by side, crossing by less than a facet, or touching along a line.
+#[test]
+fn walls_that_graze_are_moved_apart_or_named() {
+    let trunk_mm3 = Wall::from_surface(&trunk_with(&[])).unwrap().volume_mm3();
+    for deep_mm in [0.0, 0.005, 0.05, 0.1, 0.3] {
+        for beside in [
+            branch([-40.0, 7.0 - deep_mm, 40.0], [40.0, 7.0 - deep_mm, 40.0], 2.0),
+            tube(Vec3::x() * (8.0 - deep_mm), Vec3::new(8.0 - deep_mm, 0.0, 80.0), 3.0, (24, 36)),
+        ] {
+            let beside_mm3 = Wall::from_surface(&beside).unwrap().volume_mm3();
+            let mesh = trunk_with(std::slice::from_ref(&beside));
+            let wall = Wall::from_surface(&mesh).unwrap();
+            let report = wall.report();
+            assert_eq!((report.components, wall.openings().len()), (2, 4), "{deep_mm}: {:?}", report.notes());
+            let share = wall.volume_mm3() / (trunk_mm3 + beside_mm3);
+            assert!((0.97..1.0 + 1e-9).contains(&share), "{deep_mm}: {share}");
+            let checked = check(&mesh).unwrap();
+            assert_eq!(
+                report.intersections_left > 0,
+                !checked.needs_you().is_empty(),
+                "{:?}",
+                checked.needs_you()
+            );
+            let named = report
+                .repairs
+                .iter()
+                .any(|repair| matches!(repair.kind, RepairKind::MovedApart | RepairKind::StillCrossing));
+            assert_eq!(named, checked.self_intersections > 0, "{deep_mm}: {:?}", report.notes());
+        }
+    }
+}
+
+/// A mouth of which a part lies in the trunk is drawn out until it ends in it.
+#[test]
+fn branches_that_are_a_little_short_are_joined() {
+    for (from, to) in [
+        ([4.9, 0.0, 40.0], [40.0, 0.0, 40.0]),
+        ([4.6, 0.0, 40.0], [40.0, 0.0, 40.0]),
+        ([4.0, 0.0, 40.0], [30.0, 0.0, 66.0]),
+        ([4.7, 0.0, 40.0], [20.0, 3.0, 66.0]),
+    ] {
+        let mesh = trunk_with(&[branch(from, to, 2.0)]);
+        let wall = Wall::from_surface(&mesh).unwrap();
+        let report = wall.report();
+        let counts = (report.parts_united, report.components, wall.openings().len());
+        assert_eq!(counts, (1, 1, 3), "{from:?}: {:?}", report.notes());
+        let checked = check(wall.mesh()).unwrap();
+        assert!(checked.is_sound(), "{from:?}: {:?}", checked.faults());
+        let line = ExtractedCentreline::of(&wall, None, &[]).unwrap();
+        assert!(line.unreached.is_empty(), "{from:?}: {:?}", line.unreached);
+    }
+}
+
+#[test]
+fn a_vessel_through_another_one_is_named() {
+    let graft = branch([0.5, 0.0, -30.0], [0.5, 0.0, 110.0], 2.0);
+    let mesh = trunk_with(&[graft]);
+    let checked = check(&mesh).unwrap();
+    assert_eq!((checked.nested_pieces, checked.is_sound()), (1, false), "{:?}", checked.faults());
+    let told = checked.repair.repair_notes();
+    assert!(told.iter().any(|line| line.contains("inside another one")), "{told:?}");
+    assert_eq!(told, checked.needs_you());
 }
 
 /// A plug or a membrane is drawn somewhat wider than its vessel.

@@ -26,6 +26,8 @@ const FEWEST: usize = 8;
 const SKIN: f64 = 0.15;
 /// Part of the triangles of an inner piece that must be inside, of those that are asked.
 const INSIDE: f64 = 0.8;
+/// The same for an open piece that passes through another one and is no part of it.
+const THROUGH: f64 = 0.1;
 /// The same for sheets, of which the rest may stick out through the wall.
 const HALF: f64 = 0.5;
 
@@ -89,27 +91,38 @@ impl Piece {
     }
 }
 
-/// Numbers of closed pieces of a consistently oriented mesh, among the largest few, that lie inside another one, and of
-/// those that lie beside all others and are as large as a sac; `table` holds its edges.
-pub(in crate::vessel) fn nested_and_apart(mesh: &SurfaceMesh, table: &EdgeTable) -> [usize; 2] {
+/// The pieces of a consistently oriented mesh, among the largest few, that lie inside another one, and the closed ones that lie
+/// beside all others and are as large as a sac; `table` holds its edges. What was taken as a wall in the lumen is neither.
+pub(in crate::vessel) fn nested_and_apart(mesh: &SurfaceMesh, table: &EdgeTable) -> Vec<Repair> {
     let (piece_of, count) = table.components(mesh.triangles.len());
     if count < 2 {
-        return [0; 2];
+        return Vec::new();
     }
     let pieces = measure(mesh, table, &piece_of, count);
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|a, b| pieces[*b].area_mm2.total_cmp(&pieces[*a].area_mm2).then(a.cmp(b)));
     order.truncate(MOST);
-    let lies_in = |inner: usize, outer: usize| {
-        let (a, b) = (&pieces[inner], &pieces[outer]);
-        a.may_be_in(b) && is_inside(mesh, &piece_of, inner, outer)
-    };
-    let closed: Vec<usize> = (1..order.len()).filter(|rank| pieces[order[*rank]].loops == 0).collect();
-    let is_nested = |rank: &&usize| order[..**rank].iter().any(|outer| lies_in(order[**rank], *outer));
-    let nested = closed.iter().filter(is_nested).count();
+    let mut found = vec![None; count];
     // Beside a vessel that has openings: closed vessels may be several.
     let has_openings = order.iter().any(|piece| pieces[*piece].loops > 0);
-    [nested, if has_openings { closed.len() - nested } else { 0 }]
+    for (rank, &p) in order.iter().enumerate().skip(1) {
+        // An open piece passes through the openings of one that it is in.
+        let (is_closed, least) = if pieces[p].loops == 0 { (true, INSIDE) } else { (false, THROUGH) };
+        let is_content = pieces[p].volume_mm3 < 0.0;
+        let lies_in = |outer: &usize| {
+            pieces[p].meets(&pieces[*outer]) && share_inside(mesh, &piece_of, p, *outer) >= least
+        };
+        found[p] = match () {
+            () if is_content => None,
+            () if order[..rank].iter().any(lies_in) => Some(RepairKind::PieceNested),
+            () if is_closed && has_openings => Some(RepairKind::PieceApart),
+            () => None,
+        };
+    }
+    let of_kind = |kind: RepairKind| {
+        of_groups(kind, mesh, |t| Some(piece_of[t]).filter(|p| found[*p as usize] == Some(kind)))
+    };
+    [RepairKind::PieceNested, RepairKind::PieceApart].into_iter().flat_map(of_kind).collect()
 }
 
 /// Drops the pieces of a consistently oriented mesh that are neither vessels nor in the lumen of one, makes walls of
@@ -331,6 +344,11 @@ fn reaches_openings(
 
 /// Whether most of piece `inner` is inside piece `outer`, closed by its caps.
 fn is_inside(mesh: &SurfaceMesh, piece_of: &[u32], inner: usize, outer: usize) -> bool {
+    share_inside(mesh, piece_of, inner, outer) >= INSIDE
+}
+
+/// How much of piece `inner` is inside piece `outer`, closed by its caps.
+fn share_inside(mesh: &SurfaceMesh, piece_of: &[u32], inner: usize, outer: usize) -> f64 {
     let of = |p: usize| (0..piece_of.len()).filter(move |t| piece_of[*t] as usize == p);
     let mut shell = SurfaceMesh { vertices_mm: mesh.vertices_mm.clone(), triangles: Vec::new() };
     shell.triangles.extend(of(outer).map(|t| mesh.triangles[t]));
@@ -338,5 +356,5 @@ fn is_inside(mesh: &SurfaceMesh, piece_of: &[u32], inner: usize, outer: usize) -
     let caps: Vec<[Vec3; 3]> = openings.iter().flat_map(|o| o.cap(&shell).collect::<Vec<_>>()).collect();
     let own: Vec<usize> = of(inner).collect();
     let is_within = |x: &Vec3| inside::winding(&shell, &caps, x).abs() > 0.5;
-    contents::share_of(mesh, &own, is_within) >= INSIDE
+    contents::share_of(mesh, &own, is_within)
 }

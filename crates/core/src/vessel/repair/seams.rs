@@ -15,6 +15,9 @@ use crate::vessel::topology::{EdgeTable, EdgeUse};
 /// Largest distance of a vertex from an edge on which it lies, relative to the edge's length; it must not exceed the
 /// median open edge either. A circle of twelve edges is 0.07 of an edge from its chords.
 const WIDTH: f64 = 0.15;
+/// Cosine of the angle between the directions in which two surfaces end, above which they are two layers that end at one place,
+/// as a stent at the opening of its vessel, and not the sides of a seam.
+const LAYERS: f64 = 0.9;
 /// Length, in median open edges, above which open edges are not searched along.
 const MOST_CELLS: f64 = 1000.0;
 /// Number of vertices in a cell above which it is a cluster and not a seam.
@@ -94,6 +97,8 @@ struct Rims<'a> {
     /// Vertices of open edges, in order, and the shortest open edge at each, mm.
     vertices: Vec<(u32, f64)>,
     grid: HashMap<[i64; 3], Vec<u32>>,
+    /// The sum of the directions in which the surface ends at each vertex.
+    beyond: HashMap<u32, Vec3>,
 }
 
 impl<'a> Rims<'a> {
@@ -111,11 +116,24 @@ impl<'a> Rims<'a> {
             open.iter().flat_map(|edge| [edge.low, edge.high].map(|v| (v, length(edge)))).collect();
         vertices.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         vertices.dedup_by_key(|(v, _)| *v);
-        let mut rims = Self { mesh, open, cell, grid: HashMap::with_capacity(vertices.len()), vertices };
+        let grid = HashMap::with_capacity(vertices.len());
+        let mut rims =
+            Self { mesh, open, cell, grid, beyond: HashMap::with_capacity(vertices.len()), vertices };
         for &(v, _) in &rims.vertices {
             rims.grid.entry(rims.place(&at(v))).or_default().push(v);
         }
+        for edge in open {
+            for v in [edge.low, edge.high] {
+                *rims.beyond.entry(v).or_default() += beyond(mesh, edge);
+            }
+        }
         Some(rims)
+    }
+
+    /// Whether the surface ends at a vertex in this direction, too.
+    fn ends_alike(&self, v: u32, direction: &Vec3) -> bool {
+        let own = self.beyond.get(&v).copied().unwrap_or_default();
+        own.dot(direction) > LAYERS * own.norm() * direction.norm()
     }
 
     fn at(&self, v: u32) -> Vec3 {
@@ -152,6 +170,7 @@ impl<'a> Rims<'a> {
                 let other = self
                     .around(&p)
                     .filter(|w| *w != v && !beside.contains(&undirected((v, *w))))
+                    .filter(|w| !self.ends_alike(*w, &self.beyond[&v]))
                     .min_by(|a, b| off(a).total_cmp(&off(b)).then(a.cmp(b)))?;
                 (off(&other) <= WIDTH * reach).then_some((v, other))
             })
@@ -182,7 +201,9 @@ impl<'a> Rims<'a> {
             let width = (WIDTH * length).min(self.cell);
             // A flat triangle is not a seam.
             let own = self.mesh.triangles[edge.triangle as usize].map(merged);
-            for &v in near.iter().filter(|v| !own.contains(&merged(**v))) {
+            let direction = beyond(self.mesh, edge);
+            for &v in near.iter().filter(|v| !own.contains(&merged(**v)) && !self.ends_alike(**v, &direction))
+            {
                 let along = (self.at(v) - a).dot(&(b - a)) / (length * length);
                 let off = (self.at(v) - a - (b - a) * along).norm();
                 if along > 0.0
@@ -211,6 +232,15 @@ impl<'a> Rims<'a> {
             })
             .collect()
     }
+}
+
+/// The unit direction in the plane of a triangle that points out over its open edge; zero for a triangle without area.
+fn beyond(mesh: &SurfaceMesh, edge: &EdgeUse) -> Vec3 {
+    let corners = mesh.corners(edge.triangle as usize);
+    let side = edge.side as usize;
+    let along = corners[(side + 1) % 3] - corners[side];
+    let back = corners[(side + 2) % 3] - corners[side];
+    (along * (along.dot(&back) / along.norm_squared()) - back).try_normalize(0.0).unwrap_or_default()
 }
 
 /// Divides the triangle at a split edge into a fan around the opposite corner.
