@@ -125,9 +125,11 @@ impl PatientSpec {
                 finite_within(&format!("view.patient.torso.{key}"), value, range)?;
             }
             let own = [("breath_mm", torso.breath_mm), ("beat_mm", torso.beat_mm)];
-            let own =
+            let mut moves =
                 own.into_iter().filter_map(|(key, value)| Some((key, value.filter(|value| *value > 0.0)?)));
-            if let Some((key, value)) = own.filter(|_| self.vessel_moves).next() {
+            if self.vessel_moves
+                && let Some((key, value)) = moves.next()
+            {
                 let remedy = "the vessel moves ([[vessel.motion]]) and takes the body along: leave this out, or give the \
                               vessel this motion too";
                 return Err(Error::parameter(format!("view.patient.torso.{key}"), value, remedy));

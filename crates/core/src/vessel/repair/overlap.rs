@@ -45,7 +45,7 @@ pub(super) struct Closed {
 
 impl Closed {
     /// Whether it has a handle, as a ring: by Euler's characteristic V − E + F, of 2 without, with 3 F edges for every two triangles.
-    pub(super) fn is_ring(&self) -> bool {
+    fn is_ring(&self) -> bool {
         2 * self.vertices_mm.len() < self.triangles.len() + 4
     }
 }
