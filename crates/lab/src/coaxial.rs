@@ -1,15 +1,8 @@
 //! Part D: several coaxial instruments on one centre line.
 
-use std::ops::Range;
-use std::sync::Arc;
-
-use nalgebra::Matrix3;
-
 use super::planar::tip_error;
 use super::{Row, at_end, section, unit_rod};
-use endowire_core::field::{EnergyDensity, Field, MaterialPoint};
-use endowire_core::shape::Frame;
-use endowire_core::statics::{Instrument, LoadKind, Parameter, Section, StaticCase, StaticProblem};
+use endowire_core::statics::{Channel, Instrument, LoadKind, Parameter, Section, StaticCase, StaticProblem};
 use endowire_core::{Error, Result, Vec3};
 
 /// A straight instrument.
@@ -205,61 +198,21 @@ pub(super) fn curved_in_straight() -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// A close-fitting channel along a circle of this radius about (0, radius, 0), with ½ k d² per length of the innermost.
-#[derive(Debug)]
-struct Channel {
-    radius: f64,
-    stiffness: f64,
-}
-
-impl Channel {
-    /// Energy per length at a point with its derivatives.
-    fn at(&self, x: &Vec3) -> (f64, Vec3, Matrix3<f64>) {
-        let from_centre = Vec3::new(x.x, x.y - self.radius, 0.0);
-        let distance = from_centre.norm();
-        let normal = from_centre / distance;
-        let off = distance - self.radius;
-        let along = Matrix3::from_diagonal(&Vec3::new(1.0, 1.0, 0.0)) - normal * normal.transpose();
-        let across = normal * normal.transpose() + Matrix3::from_diagonal(&Vec3::z());
-        let hessian = (across + along * (off / distance)) * self.stiffness;
-        let gradient = (normal * off + Vec3::z() * x.z) * self.stiffness;
-        (0.5 * self.stiffness * (off * off + x.z * x.z), gradient, hessian)
-    }
-}
-
-impl Field for Channel {
-    fn acts_on(&self, instrument: usize) -> Range<f64> {
-        if instrument == 0 { 0.0..f64::INFINITY } else { 0.0..0.0 }
-    }
-
-    fn density(&self, point: &MaterialPoint) -> EnergyDensity {
-        let (value, by_position, by_positions) = self.at(&point.position_mm);
-        EnergyDensity { value, by_position, by_positions, ..EnergyDensity::default() }
-    }
-}
-
 /// D4: straight instruments in a close-fitting arc.
 pub(super) fn straight_in_arc() -> Result<Vec<Row>> {
     const RADIUS: f64 = 1.25;
-    let channel: Arc<dyn Field> = Arc::new(Channel { radius: RADIUS, stiffness: 1e8 });
+    let channel = Channel { radius: RADIUS, stiffness: 1e8 };
     let instruments =
         vec![straight("inner", 1.2, 0.4), straight("middle", 0.8, 1.0), straight("outer", 0.5, 2.0)];
     let stiffness: Vec<f64> = instruments.iter().map(|i| i.section[0].ei).collect();
-    let mut problem = StaticProblem::new(&stack(384, instruments))?;
-    let mut frames = vec![Frame::new(Vec3::x(), Some(Vec3::y()))];
-    for (e, length) in problem.element_lengths().enumerate() {
-        frames.push(frames[e].transported(length / RADIUS, 0.0));
-    }
-    problem.lay(Vec3::zeros(), frames);
-    let solved = problem.solution(&problem.solve_in(&[channel])?);
-    if !solved.converged {
-        return Err(Error::Computation(format!("D4: {}", solved.stop)));
-    }
-    let rows = solved.instruments.iter().zip(stiffness).map(|(instrument, ei)| {
+    let problem = StaticProblem::new(&stack(384, instruments))?;
+    let forces =
+        problem.push_forces_in(&channel).map_err(|error| Error::Computation(format!("D4: {error}")))?;
+    let names = ["inner", "middle", "outer"];
+    let rows = forces.iter().zip(stiffness).zip(names).map(|((force, ei), name)| {
         let expected = 0.5 * ei / (RADIUS * RADIUS);
-        let quantity = format!("push force of the {}", instrument.name);
-        let force = instrument.push_force.unwrap_or(f64::NAN);
-        Row::relative("D4 384 elements", &quantity, force, expected, 1e-4)
+        let quantity = format!("push force of the {name}");
+        Row::relative("D4 384 elements", &quantity, force.unwrap_or(f64::NAN), expected, 1e-4)
     });
     Ok(rows.collect())
 }

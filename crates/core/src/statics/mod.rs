@@ -2,7 +2,7 @@
 //!
 //! A [`StaticCase`] is a rod with its loads, and [`StaticCase::solve`] its equilibrium. A [`StaticProblem`] is a case made
 //! ready, to begin from a shape of one's own, to look for critical loads, or to add energies
-//! ([`Field`](crate::field::Field)). A [`WallRod`] is a rod among walls.
+//! ([`Field`](crate::field::Field)). A [`WallRod`] is a rod among walls, a [`Channel`] holds several instruments.
 //!
 //! Any consistent units may be used, or none at all (a case may have length 1 and EI 1).
 
@@ -19,6 +19,7 @@ macro_rules! by_angles {
 }
 
 mod case;
+mod channel;
 mod continuation;
 mod critical;
 mod guess;
@@ -34,6 +35,7 @@ pub use case::{
     End, EndKind, Initial, Instrument, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase,
     Surface,
 };
+pub use channel::Channel;
 pub use continuation::PathPoint;
 pub use critical::Parameter;
 pub use loads::Loads;

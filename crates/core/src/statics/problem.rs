@@ -154,11 +154,6 @@ impl StaticProblem {
         Ok(self.solution(&solved))
     }
 
-    /// Lengths of the elements, from the start on.
-    pub fn element_lengths(&self) -> impl Iterator<Item = f64> + '_ {
-        self.elements.iter().map(|element| element.length)
-    }
-
     /// Begins from a shape: from `start` on, with the frames of the nodes.
     pub fn lay(&mut self, start: Vec3, frames: Vec<Frame>) {
         self.initial = RodState::from_frames(&self.elements, start, frames);
@@ -178,7 +173,7 @@ impl StaticProblem {
     }
 
     /// The same in fields, whose units of length and energy are those of the case. They act in full in all load steps, and are no part of the energies of the
-    /// solution. Push forces of several instruments have what fields do to the line, without what they bring to material that comes in.
+    /// solution, nor of the push forces of several instruments.
     ///
     /// # Errors
     /// See [`StaticProblem::solve_state`].
@@ -296,18 +291,14 @@ impl StaticProblem {
             let rest = frame.u * first.rest_curvature[0] + frame.v * first.rest_curvature[1];
             clamp.push_force(&frame.t, first.ei, first.gj.unwrap_or(ASSUMED_GJ_RATIO * first.ei), &rest)
         });
-        let instruments = {
-            let mut untouched = None;
-            let mut outside = outside(&mut loads, &mut untouched, field.as_mut());
-            self.hands::<C>(&state, &supports, &mut outside, &clamp)
-        };
+        let instruments = self.hands::<C>(&state, &supports, &mut loads, &clamp);
         let touching = touching.map_or_else(Vec::new, |touching| touching.touching(&self.elements, &state));
         Solved { state, supports, report, monotone, energy, start, push_force, touching, instruments }
     }
 
     /// Push force and torque of each of several instruments at an equilibrium with these external energies, as in
     /// [`InstrumentSolution`]; empty for a single rod.
-    fn hands<const C: usize>(
+    pub(super) fn hands<const C: usize>(
         &self,
         state: &RodState,
         supports: &Supports,
