@@ -294,7 +294,9 @@ impl Wall {
                     return Err(Error::parameter("keep_open_mm", crate::error::vector(place), remedy));
                 }
                 far::refuse(&welding.mesh)?;
-                let wall = Self::mended(welding, None)?;
+                let mut wall = Self::mended(welding, None)?;
+                let table = EdgeTable::new(&wall.mesh.triangles);
+                wall.report.repairs.extend(repair::nested_and_apart(&wall.mesh, &table));
                 repair::refuse_unmended(&wall.mesh, &wall.report).map_or(Ok(wall), Err)
             }
         }
@@ -374,7 +376,6 @@ impl Wall {
             Some(places) => repair::cure(&mut mesh, &mut edges, tolerance_mm, places, &mut report)?,
             None => repair::turn_bodies(&mut mesh, &mut edges),
         }
-        report.repairs.extend(repair::nested_and_apart(&mesh, edges.of(&mesh.triangles)));
         Ok((mesh, edges, report))
     }
 

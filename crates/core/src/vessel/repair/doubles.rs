@@ -15,9 +15,10 @@ use parry3d_f64::shape::TriMesh;
 
 use super::contents::THICK_MM;
 use super::pieces::drop_triangles;
+use super::seams::{LAYERS, beyond};
 use crate::Vec3;
 use crate::vessel::repairs::{Repair, RepairKind, of_groups};
-use crate::vessel::topology::{DisjointSets, EdgeTable};
+use crate::vessel::topology::{DisjointSets, EdgeTable, EdgeUse};
 use crate::vessel::{SurfaceMesh, mesh};
 
 /// Largest distance of a layer from the wall, relative to the square root of its area: on a vessel of whatever unit a
@@ -53,7 +54,7 @@ pub(super) fn drop_doubles(mesh: &mut SurfaceMesh, table: &EdgeTable, noted: &mu
     Doubles { patches, skins, triangles }
 }
 
-/// Pieces of a surface, which may be layers of others. Triangles are of one piece across edges of two triangles.
+/// Pieces of a surface, which may be layers of others. Triangles are of one piece across edges where it goes on.
 struct Layers {
     piece_of: Vec<u32>,
     pieces: Vec<Piece>,
@@ -73,10 +74,8 @@ impl Layers {
     /// `None` with a single piece.
     fn new(mesh: &SurfaceMesh, table: &EdgeTable) -> Option<Self> {
         let mut sets = DisjointSets::new(mesh.triangles.len());
-        for uses in table.edges() {
-            if let [a, b] = uses {
-                sets.join(a.triangle, b.triangle);
-            }
+        for uses in table.edges().filter(|uses| goes_on(mesh, uses)) {
+            sets.join(uses[0].triangle, uses[1].triangle);
         }
         let (piece_of, count) = sets.number();
         if count < 2 {
@@ -88,7 +87,7 @@ impl Layers {
             piece.triangles.push(t);
             piece.area_mm2 += mesh::area(&mesh.corners(t as usize));
         }
-        for used in table.edges().filter(|uses| uses.len() != 2).flatten() {
+        for used in table.edges().filter(|uses| !goes_on(mesh, uses)).flatten() {
             pieces[piece_of[used.triangle as usize] as usize].has_border = true;
         }
         let vertices = mesh.vertices_mm.iter().map(to_parry).collect();
@@ -151,6 +150,12 @@ impl Layers {
         }
         Some(below)
     }
+}
+
+/// Whether a surface goes on across an edge: two layers that end at one rim only share it.
+fn goes_on(mesh: &SurfaceMesh, uses: &[EdgeUse]) -> bool {
+    let [one, other] = uses else { return false };
+    beyond(mesh, one).dot(&beyond(mesh, other)) <= LAYERS
 }
 
 /// How far the curved surface that facets stand for may be from each, mm: for each side across which it goes on smoothly, an

@@ -179,5 +179,6 @@ pub(super) fn cure(
         edges.changed();
         drop_unreferenced(mesh);
     }
+    noted.extend(nested_and_apart(mesh, edges.of(&mesh.triangles)));
     Ok(())
 }

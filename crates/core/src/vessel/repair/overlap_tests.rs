@@ -186,7 +186,12 @@ fn walls_that_graze_are_moved_apart_or_named() {
                 .repairs
                 .iter()
                 .any(|repair| matches!(repair.kind, RepairKind::MovedApart | RepairKind::StillCrossing));
-            assert_eq!(named, checked.self_intersections > 0, "{deep_mm}: {:?}", report.notes());
+            assert_eq!(
+                named,
+                checked.self_intersections + checked.non_manifold_edges > 0,
+                "{deep_mm}: {:?}",
+                report.notes()
+            );
         }
     }
 }

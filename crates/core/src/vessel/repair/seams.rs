@@ -17,7 +17,7 @@ use crate::vessel::topology::{EdgeTable, EdgeUse};
 const WIDTH: f64 = 0.15;
 /// Cosine of the angle between the directions in which two surfaces end, above which they are two layers that end at one place,
 /// as a stent at the opening of its vessel, and not the sides of a seam.
-const LAYERS: f64 = 0.9;
+pub(super) const LAYERS: f64 = 0.9;
 /// Length, in median open edges, above which open edges are not searched along.
 const MOST_CELLS: f64 = 1000.0;
 /// Number of vertices in a cell above which it is a cluster and not a seam.
@@ -235,7 +235,7 @@ impl<'a> Rims<'a> {
 }
 
 /// The unit direction in the plane of a triangle that points out over its open edge; zero for a triangle without area.
-fn beyond(mesh: &SurfaceMesh, edge: &EdgeUse) -> Vec3 {
+pub(super) fn beyond(mesh: &SurfaceMesh, edge: &EdgeUse) -> Vec3 {
     let corners = mesh.corners(edge.triangle as usize);
     let side = edge.side as usize;
     let along = corners[(side + 1) % 3] - corners[side];
