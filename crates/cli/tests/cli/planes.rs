@@ -109,7 +109,8 @@ fn arch(folder: &Path, mode: &str, more: &[&str]) -> Vec<Vec<u8>> {
     let scene = assets().join("scenes/arch_angiography.toml");
     let out = folder.join(mode).join(more.join("_"));
     // What a frame shows without noise and without what is left of the one before it.
-    let still = ["detector.noise=false", "detector.lag=0", "xray.brightness_s=0"].map(|set| ["--set", set]).concat();
+    let still =
+        ["detector.noise=false", "detector.lag=0", "xray.brightness_s=0"].map(|set| ["--set", set]).concat();
     let still = [&still[..], &["--size", "64", "--view", "fluoro"]].concat();
     let scene = ["fluoro", text(&scene), "--steps", "0", "--mode", mode, "--out", text(&out), "--json"];
     let files = reported(&endowire(&[&scene[..], &still, more].concat()));
