@@ -47,7 +47,6 @@ impl<const C: usize> BandMatrix<C> {
     }
 
     /// Entry `(i, j)`; zero outside the blocks.
-    #[cfg(test)]
     pub(crate) fn get(&self, i: usize, j: usize) -> f64 {
         let (i, j) = if i <= j { (i, j) } else { (j, i) };
         let column = j - i / Self::BLOCK * Self::BLOCK;

@@ -309,6 +309,11 @@ impl ContactSurface {
         self.regions(piece).map_or(1.0, |(mesh, regions, triangle)| regions.rough(&mesh.smooth, x, triangle))
     }
 
+    /// Whether the wall is as stiff and as rough everywhere.
+    pub(super) fn is_uniform(&self) -> bool {
+        self.mesh().is_none_or(|mesh| mesh.regions.is_none())
+    }
+
     fn regions(&self, piece: Option<u32>) -> Option<(&ContactMesh, &RegionMap, u32)> {
         let mesh = self.mesh()?;
         Some((mesh, mesh.regions.as_ref()?, piece?))

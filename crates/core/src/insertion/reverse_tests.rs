@@ -132,6 +132,9 @@ fn backwards_it_is_the_gradient_of_the_commands() {
     }
 }
 
+/// Times of a reverse pass are measured so often, beside the commands themselves.
+const REPEATS: usize = 15;
+
 /// `cargo test -p endowire-core --lib what_a_reverse_pass_costs -- --ignored --nocapture`.
 #[test]
 #[ignore = "measures time"]
@@ -139,39 +142,39 @@ fn what_a_reverse_pass_costs() {
     for scene in 0..SCENES.len() {
         let (now, commands, times_s) = before(scene, 300, 6);
         let instruments = now.stack().instruments().len();
-        let by = parameters(instruments, SCENES[scene].friction);
-        let began = Instant::now();
-        let mut alone = now.clone();
-        for (moves, time_s) in commands.iter().zip(&times_s) {
-            alone.step_until(moves, Some(*time_s)).unwrap();
-        }
-        let steps_s = began.elapsed().as_secs_f64();
-        let began = Instant::now();
+        let all = parameters(instruments, SCENES[scene].friction);
+        let of_the_hand = |one: &Parameter| {
+            matches!(one, Parameter::Advance { .. } | Parameter::Rotation { .. } | Parameter::Steering { .. })
+        };
+        let by_sides =
+            |one: &Parameter| matches!(one, Parameter::Radius { .. } | Parameter::EntryDirection { .. });
+        let local: Vec<Parameter> =
+            all.iter().copied().filter(|one| !of_the_hand(one) && !by_sides(one)).collect();
+        let lists = [&local[..0], &local[..1], &local[..10], &local[..], &all[..]];
         let recording = now.record(&commands, &times_s).unwrap();
-        let recorded_s = began.elapsed().as_secs_f64();
         let weights: Vec<Weights> =
             (0..6).map(|_| Weights { tip_mm: Vec3::x(), ..Weights::default() }).collect();
-        let cost = |by: &[Parameter], hands: bool| {
+        let mut costs = vec![Vec::new(); lists.len() + 1];
+        for _ in 0..REPEATS {
             let began = Instant::now();
-            if hands {
-                recording.vjp(&weights, by).unwrap()
-            } else {
-                recording.vjp_by(&weights, by).unwrap()
-            };
-            began.elapsed().as_secs_f64() / steps_s
+            let mut alone = now.clone();
+            for (moves, time_s) in commands.iter().zip(&times_s) {
+                alone.step_until(moves, Some(*time_s)).unwrap();
+            }
+            let steps_s = began.elapsed().as_secs_f64();
+            for (costs, by) in costs.iter_mut().zip(lists) {
+                let began = Instant::now();
+                recording.vjp_by(&weights, by).unwrap();
+                costs.push(began.elapsed().as_secs_f64() / steps_s);
+            }
+            costs[lists.len()].push(1e3 * steps_s / 6.0);
+        }
+        let median = |list: &mut Vec<f64>| {
+            list.sort_by(f64::total_cmp);
+            list[list.len() / 2]
         };
-        let costs =
-            [cost(&[], false), cost(&[Parameter::WallModulus], false), cost(&[], true), cost(&by, true)];
-        println!(
-            "{:?}: {:.1} ms a step, recorded {:.2}; none {:.2}, one parameter {:.2}, all hands {:.2}, with {} parameters {:.2} steps",
-            SCENES[scene],
-            1e3 * steps_s / 6.0,
-            recorded_s / steps_s,
-            costs[0],
-            costs[1],
-            costs[2],
-            by.len(),
-            costs[3]
-        );
+        let found: Vec<String> = costs.iter_mut().map(|list| format!("{:.2}", median(list))).collect();
+        let counts: Vec<usize> = lists.iter().map(|by| by.len()).collect();
+        println!("{:?}: {counts:?} parameters, in steps, and ms a step: {}", SCENES[scene], found.join(", "));
     }
 }

@@ -76,6 +76,13 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
+    /// For the forces alone of a rod of `elements` elements.
+    pub(crate) fn forces(elements: usize) -> Self {
+        let n = Layout::<C>::dimension(elements);
+        let nothing = Self::new(0);
+        Self { residual: vec![0.0; n], correction: vec![0.0; n], hessian: false, ..nothing }
+    }
+
     /// Changes the size without releasing memory.
     pub(crate) fn resize(&mut self, elements: usize) {
         let n = Layout::<C>::dimension(elements);

@@ -21,6 +21,7 @@ use super::rim::{rim_energy, rim_system};
 use super::state::RodState;
 use super::torsion::TwistValue;
 use pulp::{Arch, Scalar, Simd, WithSimd, bytemuck};
+use std::ops::Range;
 
 /// The element's energy alone, where two neighbouring nodes have `C` unknowns.
 pub(crate) fn element_energy<const C: usize>(data: &ElementData, s: &ElementState) -> Energy {
@@ -80,20 +81,20 @@ impl<const C: usize> WithSimd for Stored<'_, C> {
     }
 }
 
-/// Calls `tell` with the gradient and the derivative of the elongation of each of `count` elements, made by `data`,
+/// Calls `tell` with the gradient and the derivative of the elongation of each of these elements, made by `data`,
 /// at `state`, without axial force.
 pub(crate) fn element_gradients<const C: usize>(
-    count: usize,
+    range: Range<usize>,
     data: impl Fn(usize) -> ElementData,
     state: &RodState,
     tell: impl FnMut(usize, &[f64; C], &[f64; C]),
 ) {
-    Arch::new().dispatch(Gradients { count, data, state, tell });
+    Arch::new().dispatch(Gradients { range, data, state, tell });
 }
 
 /// Computes gradients of elements that are made one after the other.
 pub(super) struct Gradients<'a, const C: usize, D, T> {
-    pub(super) count: usize,
+    pub(super) range: Range<usize>,
     pub(super) data: D,
     pub(super) state: &'a RodState,
     pub(super) tell: T,
@@ -111,17 +112,18 @@ where
         let zero = Lanes::splat(simd, 0.0);
         let mut all = ElementSystem::<C, S::f64s>::filled(zero.stored());
         let mut made = [ElementData::EMPTY; MOST];
-        for first in (0..self.count).step_by(S::F64_LANES) {
+        let end = self.range.end;
+        for first in self.range.step_by(S::F64_LANES) {
             for (lane, data) in made.iter_mut().enumerate().take(S::F64_LANES) {
-                *data = (self.data)((first + lane).min(self.count - 1));
+                *data = (self.data)((first + lane).min(end - 1));
             }
             let mut lanes = [self.state.lane::<C>(&made[0], first); MOST];
             for lane in 0..S::F64_LANES {
-                lanes[lane] = self.state.lane::<C>(&made[lane], (first + lane).min(self.count - 1));
+                lanes[lane] = self.state.lane::<C>(&made[lane], (first + lane).min(end - 1));
                 lanes[lane].tension = 0.0;
             }
             system::<S, C, false>(&Batch::new::<C>(simd, &lanes), zero, &mut all);
-            for lane in 0..S::F64_LANES.min(self.count - first) {
+            for lane in 0..S::F64_LANES.min(end - first) {
                 let of = |list: &[S::f64s; C], i: usize| {
                     bytemuck::cast_slice::<_, f64>(list)[i * S::F64_LANES + lane]
                 };

@@ -91,7 +91,7 @@ fn gradients_side_by_side_are_those_of_each_without_axial_force() {
     let (elements, rod) = rod(5, 2, 7);
     let mut seen = 0;
     element_gradients::<20>(
-        elements.len(),
+        0..elements.len(),
         |e| elements[e],
         &rod,
         |e, gradient, stretch| {

@@ -56,7 +56,7 @@ pub(super) struct Pressed {
     /// κ, N/mm.
     kappa: f64,
     /// Its energy, mJ, and the gradient of that in its position, N.
-    stored_mj: f64,
+    pub(super) stored_mj: f64,
     pub(super) gradient: Vec3,
     /// The part of the gradient along that of the distance.
     pressing: Vec3,

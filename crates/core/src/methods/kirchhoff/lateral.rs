@@ -195,7 +195,7 @@ fn parts<const C: usize>(
     let both = |of: &[f64; C]| [0, 1].map(|i| NodeForce::of(of, l.position(i), l.tangent(i)));
     let mut all = Vec::with_capacity(count);
     let data = |e: usize| inside(stack, mesh, (e, instrument));
-    element_gradients::<C>(count, &data, rod, |_, gradient, stretch| {
+    element_gradients::<C>(0..count, &data, rod, |_, gradient, stretch| {
         let ([near, far], [near_pull, far_pull]) = (both(gradient), both(stretch));
         all.push([near, far, near_pull, far_pull]);
     });

@@ -1,7 +1,7 @@
 //! What an equilibrium stores and exerts: its energies, the drag on it, and the forces of the hands.
 
 use super::Environment;
-use super::configuration::Configuration;
+use super::configuration::{Configuration, Start};
 use super::hands::HandForce;
 use super::material::at_mouth;
 use super::slopes::{Acting, set_hand_forces, steer_mj};
@@ -9,7 +9,7 @@ use super::state::KirchhoffState;
 use super::workspace::Tools;
 use crate::Vec3;
 use crate::contact::Drag;
-use crate::methods::Energy;
+use crate::methods::{Energy, Sheath};
 use crate::rod::Clamp;
 
 impl<const C: usize> Tools<C> {
@@ -26,9 +26,7 @@ impl<const C: usize> Tools<C> {
             }
         }
         let state = at.parts().1;
-        state.across_n = clamp.map_or(0.0, |clamp| {
-            (clamp.force - sheath.direction * clamp.force.dot(&sheath.direction)).norm()
-        });
+        state.across_n = clamp.map_or(0.0, |clamp| across_n(sheath, &clamp));
         let KirchhoffState { rod, twists, hand_forces, energy, across_n, .. } = state;
         let (stored_mj, at_grips) = self.tails.write((sheath, *across_n), rod, twists, hand_forces);
         energy.tail = stored_mj;
@@ -77,23 +75,8 @@ impl<const C: usize> Tools<C> {
             self.add_inner_friction(at);
             return Some(clamp);
         }
-        let frame = rod.material_frame(0);
-        let ends = (mesh.from_tip_mm[0], mesh.from_tip_mm[1]);
-        let section = at_mouth(surroundings.device, ends, mesh.flush_mm);
-        // What comes in where the wall presses stores energy in it.
-        let coming_in = state.touches.iter().filter_map(|(index, touch)| {
-            let point = mesh.points.get(*index).filter(|point| mesh.is_coming_in(point))?;
-            Some(touch.energy_mj / point.weight_mm)
-        });
-        let torsion = section.torsion_nmm2();
-        let clamped_n = if section.soft_plane.is_some() {
-            clamp.skew_push_force(&frame, section.stiffness_nmm2(), torsion, section.rest_curvature_per_mm)
-        } else {
-            let [along_u, along_v] = section.rest_curvature_per_mm;
-            let rest = frame.u * along_u + frame.v * along_v;
-            clamp.push_force(&frame.t, section.bending_stiffness_nmm2, torsion, &rest)
-        };
-        let push_n = clamped_n + coming_in.sum::<f64>() + self.newton.unbalanced_along_n(rod);
+        let push_n =
+            alone_push_n(environment, Start { mesh, state }, &clamp) + self.newton.unbalanced_along_n(rod);
         state.hand_forces[0] = HandForce { push_n, ..HandForce::default() };
         Some(clamp)
     }
@@ -108,4 +91,35 @@ impl<const C: usize> Tools<C> {
             state.hand_forces[place.outer].push_n -= friction_n;
         }
     }
+}
+
+/// Push force inside the body of a device alone, N, with these forces at the sheath's mouth, without what is out of balance.
+pub(super) fn alone_push_n(
+    environment: &Environment<'_>,
+    Start { mesh, state }: Start<'_>,
+    clamp: &Clamp,
+) -> f64 {
+    let surroundings = &environment.surroundings;
+    let frame = state.rod.material_frame(0);
+    let ends = (mesh.from_tip_mm[0], mesh.from_tip_mm[1]);
+    let section = at_mouth(surroundings.device, ends, mesh.flush_mm);
+    // What comes in where the wall presses stores energy in it.
+    let coming_in = state.touches.iter().filter_map(|(index, touch)| {
+        let point = mesh.points.get(*index).filter(|point| mesh.is_coming_in(point))?;
+        Some(touch.energy_mj / point.weight_mm)
+    });
+    let torsion = section.torsion_nmm2();
+    let clamped_n = if section.soft_plane.is_some() {
+        clamp.skew_push_force(&frame, section.stiffness_nmm2(), torsion, section.rest_curvature_per_mm)
+    } else {
+        let [along_u, along_v] = section.rest_curvature_per_mm;
+        let rest = frame.u * along_u + frame.v * along_v;
+        clamp.push_force(&frame.t, section.bending_stiffness_nmm2, torsion, &rest)
+    };
+    clamped_n + coming_in.sum::<f64>()
+}
+
+/// Force across the sheath at its mouth, N.
+pub(super) fn across_n(sheath: &Sheath, clamp: &Clamp) -> f64 {
+    (clamp.force - sheath.direction * clamp.force.dot(&sheath.direction)).norm()
 }

@@ -42,10 +42,13 @@
 //! Forces and energies are read out at both states, and differenced. A part that ended in a jump, or in which friction was
 //! anchored anew, has no derivative.
 
+mod columns;
 mod command;
 mod forces;
 mod linear;
+mod numbers;
 mod read;
+mod readings;
 mod recorded;
 mod remembered;
 mod reverse;

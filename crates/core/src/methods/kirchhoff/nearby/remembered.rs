@@ -124,6 +124,37 @@ impl Chain {
     }
 }
 
+/// Where a force and a moment at a point act on the rod.
+pub(super) struct Scatter {
+    columns: [(usize, Vec3); 10],
+    /// None without angles.
+    turning: Option<[(usize, f64); 3]>,
+}
+
+impl Scatter {
+    /// At a contact point.
+    pub(super) fn at<const C: usize>(rod: &RodState, mesh: &Mesh, index: usize) -> Self {
+        let (e, xi, set) = mesh.points[index].place();
+        Self {
+            columns: point_columns::<C>(rod, &mesh.elements[e], e, xi),
+            turning: (Layout::<C>::ANGLES > 0).then(|| angle_weights::<C>((e, xi, set))),
+        }
+    }
+
+    /// Tells the rows of a force and a moment.
+    pub(super) fn add(&self, (force, moment): (Vec3, f64), mut tell: impl FnMut(usize, f64)) {
+        self.columns.iter().for_each(|(row, way)| tell(*row, way.dot(&force)));
+        self.turning.iter().flatten().for_each(|(row, weight)| tell(*row, weight * moment));
+    }
+}
+
+/// A part of the angle that a point had before: that of material in a tail.
+pub(super) struct Entered {
+    pub(super) instrument: usize,
+    pub(super) from_tip_mm: f64,
+    pub(super) weight: f64,
+}
+
 /// Derivatives of a vector.
 type Vectors = Vec<(usize, Vec3)>;
 
@@ -259,17 +290,23 @@ impl Between<'_> {
         each.collect()
     }
 
-    /// Of the angle of the slid device in a set at this distance from the line's tip, against triads that are carried without twist.
-    fn slid_angle_at<const C: usize>(&self, set: usize, from_line_tip: f64) -> Row {
-        let (to, from, l) = (self.mesh, self.before.mesh, Layout::<C>);
-        let sets = self.stack.sets();
+    /// The instrument that has a set at this distance from the line's tip, how far from its own tip that is, and how far it was in before.
+    fn instrument_at(&self, set: usize, from_line_tip: f64) -> Option<(usize, f64, f64)> {
+        let (to, sets) = (self.mesh, self.stack.sets());
         let is_in = |index: &usize| to.inserted_mm[*index] > 0.0;
         let of_set: Vec<usize> = (0..sets.len()).filter(|index| sets[*index] == Some(set)).collect();
-        let Some(index) = of_set.iter().rev().copied().find(is_in).or(of_set.last().copied()) else {
+        let index = of_set.iter().rev().copied().find(is_in).or(of_set.last().copied())?;
+        let inserted = self.before.mesh.inserted_mm.get(index).copied().unwrap_or(0.0);
+        let from_tip = (from_line_tip - (to.from_tip_mm[0] - to.inserted_mm[index])).max(0.0);
+        Some((index, from_tip, inserted))
+    }
+
+    /// Of the angle of the slid device in a set at this distance from the line's tip, against triads that are carried without twist.
+    fn slid_angle_at<const C: usize>(&self, set: usize, from_line_tip: f64) -> Row {
+        let (from, l) = (self.before.mesh, Layout::<C>);
+        let Some((index, from_tip, inserted)) = self.instrument_at(set, from_line_tip) else {
             return Row::new();
         };
-        let inserted = from.inserted_mm.get(index).copied().unwrap_or(0.0);
-        let from_tip = (from_line_tip - (to.from_tip_mm[0] - to.inserted_mm[index])).max(0.0);
         if inserted <= from_tip {
             return self.in_tail::<C>(index, from_tip);
         }
@@ -313,6 +350,30 @@ impl Between<'_> {
             Some(was) if was > 0 => vec![(Layout::<C>.bubble(was, set), 1.0)],
             _ => Row::new(),
         }
+    }
+
+    /// Material at this distance from the line's tip that was in the tail before.
+    fn entered_at(&self, set: usize, from_line_tip: f64, weight: f64) -> Option<Entered> {
+        let (instrument, from_tip_mm, inserted_mm) = self.instrument_at(set, from_line_tip)?;
+        (inserted_mm <= from_tip_mm).then_some(Entered { instrument, from_tip_mm, weight })
+    }
+
+    /// What of the angle of a point before the part was that of material in tails.
+    pub(super) fn entered(&self, index: usize) -> Vec<Entered> {
+        let (e, xi, set) = self.mesh.points[index].place();
+        let [w0, w1, wb] = Point::at(xi, 0.0).phi;
+        let ends = [e, e + 1].map(|node| self.mesh.from_tip_mm[node]);
+        if self.stack.is_several() {
+            // The bubble is the angle in the middle less the mean of both ends.
+            let middle = self.entered_at(set, 0.5 * (ends[0] + ends[1]), wb);
+            let [first, second] = [(ends[0], w0 - 0.5 * wb), (ends[1], w1 - 0.5 * wb)]
+                .map(|(from_tip_mm, weight)| self.entered_at(set, from_tip_mm, weight));
+            return [first, second, middle].into_iter().flatten().collect();
+        }
+        let gone = (self.mesh.line()).saturating_sub(self.before.state.rod.elements());
+        let each = [(e, w0), (e + 1, w1)].into_iter().filter(|(node, _)| *node == 0 || *node < gone);
+        each.map(|(node, weight)| Entered { instrument: 0, from_tip_mm: self.mesh.from_tip_mm[node], weight })
+            .collect()
     }
 
     /// Of how far the device has spun at a node, as far as it is remembered.
@@ -412,18 +473,13 @@ impl Between<'_> {
             all.extend(vectors.iter().map(|(column, way)| (*column, force * way, moment.dot(way))));
         }
         all.sort_unstable_by_key(|(column, ..)| *column);
-        let columns = point_columns::<C>(self.rod, &self.mesh.elements[e], e, xi);
+        let scatter = Scatter::at::<C>(self.rod, self.mesh, index);
         for same in all.chunk_by(|a, b| a.0 == b.0) {
             let force: Vec3 = same.iter().map(|(_, force, _)| force).sum();
             let moment: f64 = same.iter().map(|(.., moment)| moment).sum();
             (0..3).for_each(|axis| rows.add(first + axis, same[0].0, force[axis]));
             rows.add(first + 3, same[0].0, moment);
-            for (row, way) in &columns {
-                rows.add(*row, same[0].0, way.dot(&force));
-            }
-            for (row, weight) in angle_weights::<C>((e, xi, set)) {
-                rows.add(row, same[0].0, weight * moment);
-            }
+            scatter.add((force, moment), |row, own| rows.add(row, same[0].0, own));
         }
     }
 
@@ -433,16 +489,12 @@ impl Between<'_> {
         let l = Layout::<C>;
         let mut lagging = Sparse::default();
         for at in pressing {
-            let (e, xi, set) = self.mesh.points[at.index].place();
-            let columns = point_columns::<C>(self.rod, &self.mesh.elements[e], e, xi);
-            let turning = angle_weights::<C>((e, xi, set));
+            let (e, xi, _) = self.mesh.points[at.index].place();
+            let scatter = Scatter::at::<C>(self.rod, self.mesh, at.index);
             let mut add = |column: usize, force: Vec3, moment: f64| {
-                columns.iter().for_each(|(row, way)| lagging.add(*row, column, way.dot(&force)));
-                if Layout::<C>::ANGLES > 0 {
-                    turning.iter().for_each(|(row, weight)| lagging.add(*row, column, weight * moment));
-                }
+                scatter.add((force, moment), |row, own| lagging.add(row, column, own));
             };
-            for (column, way) in &columns {
+            for (column, way) in &scatter.columns {
                 add(*column, at.lagging.0 * way, at.lagging.1.dot(way));
             }
             let Some(friction) = at.friction.filter(|_| !self.slid.is_empty()) else { continue };

@@ -10,7 +10,9 @@ use super::super::configuration::Configuration;
 use super::super::hands::{Hand, lengths};
 use super::super::workspace::Workspace;
 use super::super::{Environment, Kirchhoff, KirchhoffOptions, write_line};
-use super::linear::{Linear, Numbers, Wanted};
+use super::columns::Beside;
+use super::linear::Linear;
+use super::numbers::{Numbers, Wanted};
 use super::read::margin;
 use super::recorded::{Piece, Recorder};
 use super::{STEP, Scene, scale};
@@ -162,7 +164,7 @@ impl<const C: usize> Record<C> {
     }
 
     /// Scenes beside that of the commands, in which one parameter is a little less and more; none for those of the first command.
-    fn scenes(&self, surroundings: &Surroundings<'_>, by: &[Parameter]) -> Result<Vec<[(f64, Scene); 2]>> {
+    fn scenes(&self, surroundings: &Surroundings<'_>, by: &[Parameter]) -> Result<Vec<Beside>> {
         let environment = Environment::new(surroundings, &self.surface, &self.options);
         let mut scenes = Vec::new();
         for parameter in by {
@@ -170,7 +172,7 @@ impl<const C: usize> Record<C> {
             let step = STEP * scale(&environment, &together)?;
             if motion(parameter).is_none() {
                 let side = |by: f64| Ok::<_, Error>((by, Scene::new(surroundings, &together, by)?));
-                scenes.push([side(-step)?, side(step)?]);
+                scenes.push(Beside { parameter: *parameter, sides: [side(-step)?, side(step)?] });
             }
         }
         Ok(scenes)

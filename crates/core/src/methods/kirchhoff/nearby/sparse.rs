@@ -36,6 +36,12 @@ impl Sparse {
         }
     }
 
+    /// A row.
+    pub(super) fn row(&self, row: usize) -> Row {
+        let of = self.entries.iter().filter(|(own, ..)| *own as usize == row);
+        of.map(|(_, column, value)| (*column as usize, *value)).collect()
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
