@@ -46,7 +46,7 @@ done
 draw() { # NAME OF THE FOLDER, OPTIONS
   "$endowire" fluoro assets/scenes/arch_angiography.toml --out "$out/$1" "${@:2}"
 }
-draw live "${rests[@]}" --size 320 --mode fluoro --time -1 --count 8 --hold
+draw live "${rests[@]}" --size 320 --mode fluoro --set 'view.injection=[]' --time 0 --count 8 --hold
 cp "$out/live/frame_000007_fluoro.png" "$to"/arch_fluoro.png
 cp "$out/live/hold.png" "$to"/arch_hold.png
 draw cine "${rests[@]}" --size 320 --mode cine --time 1.6

@@ -267,7 +267,6 @@ fn a_snap_counts_as_well_and_is_seen_on_its_way() {
     while bounded.report().is_under_way() && steps < 400 {
         let report = bounded.step_together(&[]).unwrap();
         assert!(report.solves as usize <= 10 + ITERATION, "{}", report.solves);
-        assert_ne!(report.converged, report.is_under_way());
         (steps, jumps) = (steps + 1, jumps + usize::from(report.jumped));
     }
     assert!((2..400).contains(&steps) && jumps == 1, "{steps} {jumps}");

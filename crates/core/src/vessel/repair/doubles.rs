@@ -54,7 +54,7 @@ pub(super) fn drop_doubles(mesh: &mut SurfaceMesh, table: &EdgeTable, noted: &mu
     Doubles { patches, skins, triangles }
 }
 
-/// Pieces of a surface, which may be layers of others. Triangles are of one piece across edges where it goes on.
+/// Pieces of a surface, which may be layers of others. Two layers that share one rim are two.
 struct Layers {
     piece_of: Vec<u32>,
     pieces: Vec<Piece>,
@@ -77,22 +77,46 @@ impl Layers {
         for uses in table.edges().filter(|uses| goes_on(mesh, uses)) {
             sets.join(uses[0].triangle, uses[1].triangle);
         }
+        let (side_of, sides) = sets.number();
+        let (part_of, parts) = table.components(mesh.triangles.len());
+        if sides < 2 {
+            return None;
+        }
+        // Two layers of one rim cover each other; other sides of a fold belong to one piece.
+        let mut sides_of_part = vec![Vec::new(); parts];
+        for (side, part) in side_of.iter().zip(&part_of) {
+            let sides: &mut Vec<u32> = &mut sides_of_part[*part as usize];
+            if sides.len() < 3 && !sides.contains(side) {
+                sides.push(*side);
+            }
+        }
+        let vertices = mesh.vertices_mm.iter().map(to_parry).collect();
+        let shape = TriMesh::new(vertices, mesh.triangles.clone()).ok()?;
+        let mut layers = Self {
+            pieces: pieces_of(mesh, table, &side_of, sides),
+            piece_of: side_of,
+            sagitta_mm: sagittae_mm(mesh, table),
+            shape,
+        };
+        let covers = |one: u32, other: u32| {
+            layers.ground_of(mesh, one as usize, |piece| piece == other as usize).is_some()
+        };
+        let are_twins = |sides: &Vec<u32>| matches!(sides[..], [a, b] if covers(a, b) && covers(b, a));
+        let is_parted: Vec<bool> = sides_of_part.iter().map(are_twins).collect();
+        let mut sets = DisjointSets::new(mesh.triangles.len());
+        for uses in table.edges() {
+            let is_parted = is_parted[part_of[uses[0].triangle as usize] as usize];
+            if !is_parted || goes_on(mesh, uses) {
+                uses[1..].iter().for_each(|other| sets.join(uses[0].triangle, other.triangle));
+            }
+        }
         let (piece_of, count) = sets.number();
         if count < 2 {
             return None;
         }
-        let mut pieces = vec![Piece::default(); count];
-        for (t, piece) in (0..).zip(&piece_of) {
-            let piece = &mut pieces[*piece as usize];
-            piece.triangles.push(t);
-            piece.area_mm2 += mesh::area(&mesh.corners(t as usize));
-        }
-        for used in table.edges().filter(|uses| !goes_on(mesh, uses)).flatten() {
-            pieces[piece_of[used.triangle as usize] as usize].has_border = true;
-        }
-        let vertices = mesh.vertices_mm.iter().map(to_parry).collect();
-        let shape = TriMesh::new(vertices, mesh.triangles.clone()).ok()?;
-        Some(Self { piece_of, pieces, sagitta_mm: sagittae_mm(mesh, table), shape })
+        layers.pieces = pieces_of(mesh, table, &piece_of, count);
+        layers.piece_of = piece_of;
+        Some(layers)
     }
 
     /// Which pieces are superfluous, and as what.
@@ -150,6 +174,22 @@ impl Layers {
         }
         Some(below)
     }
+}
+
+/// The pieces that triangles belong to.
+fn pieces_of(mesh: &SurfaceMesh, table: &EdgeTable, piece_of: &[u32], count: usize) -> Vec<Piece> {
+    let mut pieces = vec![Piece::default(); count];
+    for (t, piece) in (0..).zip(piece_of) {
+        let piece = &mut pieces[*piece as usize];
+        piece.triangles.push(t);
+        piece.area_mm2 += mesh::area(&mesh.corners(t as usize));
+    }
+    let piece = |used: &EdgeUse| piece_of[used.triangle as usize];
+    let is_border = |uses: &[EdgeUse]| uses.len() != 2 || piece(&uses[0]) != piece(&uses[1]);
+    for used in table.edges().filter(|uses| is_border(uses)).flatten() {
+        pieces[piece(used) as usize].has_border = true;
+    }
+    pieces
 }
 
 /// Whether a surface goes on across an edge: two layers that end at one rim only share it.

@@ -6,6 +6,7 @@
 
 use crate::vessel::SurfaceMesh;
 use crate::vessel::crossings::{Crossings, crossings};
+use crate::vessel::intersect::triangles_intersect;
 use crate::vessel::repairs::{Repair, RepairKind, of_triangles};
 use crate::vessel::topology::EdgeTable;
 
@@ -39,8 +40,9 @@ pub(super) fn part(
     let table = EdgeTable::new(&mesh.triangles);
     let (piece_of, _) = table.components(mesh.triangles.len());
     let is_between = |[a, b]: &[u32; 2]| piece_of[*a as usize] != piece_of[*b as usize];
-    let (between, own): (Vec<_>, Vec<_>) = found.pairs.iter().copied().partition(is_between);
+    let (mut between, own): (Vec<_>, Vec<_>) = found.pairs.iter().copied().partition(is_between);
     found.pairs = own;
+    between.retain(|pair| cross(mesh, pair));
     if between.is_empty() {
         return Parted::default();
     }
@@ -67,7 +69,7 @@ pub(super) fn part(
         if now.capped || folded {
             break;
         }
-        left = now.pairs.into_iter().filter(is_between).collect();
+        left = now.pairs.into_iter().filter(|pair| is_between(pair) && cross(&moved, pair)).collect();
         if left.is_empty() {
             let touched = (0..is_marked.len() as u32).filter(|t| is_marked[*t as usize]);
             let touched: Vec<u32> = touched.collect();
@@ -78,6 +80,15 @@ pub(super) fn part(
     }
     noted.extend(of_triangles(RepairKind::StillCrossing, mesh, between.into_iter().flatten()));
     Parted { moved: 0, left: given }
+}
+
+/// Whether two triangles that intersect do not only meet in corners at one place, as where an edge of both was cut apart.
+fn cross(mesh: &SurfaceMesh, [a, b]: &[u32; 2]) -> bool {
+    let vertices = &mesh.vertices_mm;
+    let [first, second] = [a, b].map(|t| mesh.triangles[*t as usize]);
+    let in_first = |v: u32| first.into_iter().find(|w| vertices[*w as usize] == vertices[v as usize]);
+    let meeting = second.map(|v| in_first(v).unwrap_or(v));
+    meeting.iter().all(|v| first.contains(v)) || triangles_intersect(vertices, first, meeting)
 }
 
 /// How far each vertex is moved at once, mm.

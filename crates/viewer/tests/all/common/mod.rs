@@ -82,13 +82,14 @@ pub(crate) fn device(points: usize, radius_mm: f64, at: impl Fn(f64) -> Vec3) ->
     DeviceView { points, ..DeviceView::default() }
 }
 
-/// A fluoroscopic view with the isocentre at the origin, at 60 keV on an ideal detector.
+/// A fluoroscopic view with the isocentre at the origin, at 60 keV on an ideal detector, with an exposure that is
+/// held.
 pub(crate) fn spec(backend: Backend, size: u32, pixel_mm: f64) -> ViewSpec {
     ViewSpec {
         size_px: [size, size],
         views: vec![View::Fluoro],
         backend,
-        xray: XRaySpec { energy_kev: Some(60.0), harmonised: 0.0, ..XRaySpec::default() },
+        xray: XRaySpec { energy_kev: Some(60.0), harmonised: 0.0, brightness_s: 0.0, ..XRaySpec::default() },
         detector: DetectorSpec::ideal(),
         c_arm: CArmSpec { pixel_mm: Some(pixel_mm), isocentre_mm: Some([0.0; 3]), ..CArmSpec::default() },
         ..ViewSpec::default()
