@@ -532,6 +532,7 @@ fn medium_and_blades_brighten_a_live_picture_over_some_frames() {
     // Blades that leave the denser middle of a body: dark at first, then as if they had always been there.
     let (mut view, wall) = scene(&folder, Mode::Fluoro);
     view.detector = DetectorSpec::ideal();
+    view.xray.brightness_s = 0.3;
     view.patient.torso = Some(TorsoSpec { breath_mm: Some(0.0), beat_mm: Some(0.0), ..TorsoSpec::default() });
     view.c_arm.pixel_mm = Some(2.4);
     let narrow = ViewSpec {
