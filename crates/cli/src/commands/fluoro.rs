@@ -9,7 +9,7 @@ use endowire_core::vessel::{Displacement, VesselMotion};
 use endowire_recording::InjectionRow;
 use endowire_viewer::{ContactView, FrameTime, Moment, Seen};
 
-use super::studio::{Plan, Still, Studio, Went};
+use super::studio::{MOST_FRAMES, Plan, Still, Studio, Went};
 use crate::args::{FluoroArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
@@ -23,8 +23,8 @@ const LATEST_S: f64 = 1e6;
 /// Carries out the script, then draws.
 pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
-    if args.count == 0 {
-        return Err(Failure::Input("--count 0: draw at least one frame".to_owned()));
+    if !(1..=MOST_FRAMES).contains(&args.count) {
+        return Err(Failure::Input(format!("--count {}: draw 1 to {MOST_FRAMES} frames", args.count)));
     }
     if !(0.0..=LATEST_S).contains(&args.time) {
         return Err(Failure::Input(format!("--time {}: must be from 0 to {LATEST_S} s", number(args.time))));

@@ -167,7 +167,7 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_remedy() {
     std::fs::write(&nan, pose).unwrap();
     let still = |more: &[&'static str]| [&["fluoro", text(&scene), "--steps", "0"], more].concat();
     // Each message names key, value and remedy.
-    let cases: [(Vec<&str>, &[&str]); 26] = [
+    let cases: [(Vec<&str>, &[&str]); 28] = [
         (vec!["render", text(&nothing)], &["nothing", "recorded run"]),
         (vec!["render", text(&run), "--pose", "north 3"], &["north 3", "say angles as in \"LAO 40\""]),
         (
@@ -194,6 +194,8 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_remedy() {
             vec!["fluoro", text(&nan), "--steps", "0"],
             &["view.c_arm.primary_deg = NaN: must be a number from"],
         ),
+        (still(&["--count", "0"]), &["--count 0: draw 1 to 100000 frames"]),
+        (still(&["--count", "100001"]), &["--count 100001: draw 1 to 100000 frames"]),
         (still(&["--time", "-1"]), &["--time -1: must be from 0 to 1000000 s"]),
         (still(&["--time", "nan"]), &["--time NaN: must be from 0"]),
         (still(&["--time", "1e30"]), &["--time 1e30: must be from 0"]),

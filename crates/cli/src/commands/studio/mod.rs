@@ -23,6 +23,7 @@ use crate::output::manifest::Manifest;
 use crate::output::{print_json, tell, to_json, whole};
 use crate::scenes;
 use plane::{Plane, write_dicom};
+pub(super) use wishes::MOST_FRAMES;
 
 /// One state to draw.
 pub(super) struct Still<'a> {

@@ -10,8 +10,9 @@ use crate::scenes::of_scene_and_view;
 
 /// Largest rotation: a hundred turns.
 const MOST_TURN_DEG: f64 = 36_000.0;
-/// Largest number of frames of a turn, and range of its speed.
-const MOST_FRAMES: f64 = 100_000.0;
+/// Largest number of frames.
+pub(crate) const MOST_FRAMES: u32 = 100_000;
+/// Range of the speed of a turn.
 const DEG_PER_S: [f64; 2] = [0.01, 1e4];
 
 /// Number of frames of a C-arm turn with a given speed, including the first and the last.
@@ -22,7 +23,7 @@ pub(super) fn frames_of_turn(args: &FrameArgs, frames_per_s: f64) -> Result<Opti
         return Err(Failure::Input(format!("--deg-per-s {speed:e}: give {low} to {high} degrees a second")));
     }
     let frames = (turn.abs() / speed * frames_per_s).round() + 1.0;
-    if frames.is_nan() || frames > MOST_FRAMES {
+    if frames.is_nan() || frames > f64::from(MOST_FRAMES) {
         let text = format!(
             "--turn {turn:e} --deg-per-s {speed:e}: {frames:e} frames, and at most {MOST_FRAMES} are drawn"
         );
