@@ -79,9 +79,6 @@ impl Layers {
         }
         let (side_of, sides) = sets.number();
         let (part_of, parts) = table.components(mesh.triangles.len());
-        if sides < 2 {
-            return None;
-        }
         // Two layers of one rim cover each other; other sides of a fold belong to one piece.
         let mut sides_of_part = vec![Vec::new(); parts];
         for (side, part) in side_of.iter().zip(&part_of) {
@@ -89,6 +86,9 @@ impl Layers {
             if sides.len() < 3 && !sides.contains(side) {
                 sides.push(*side);
             }
+        }
+        if parts < 2 && sides_of_part.iter().all(|sides| sides.len() != 2) {
+            return None;
         }
         let vertices = mesh.vertices_mm.iter().map(to_parry).collect();
         let shape = TriMesh::new(vertices, mesh.triangles.clone()).ok()?;
@@ -103,19 +103,22 @@ impl Layers {
         };
         let are_twins = |sides: &Vec<u32>| matches!(sides[..], [a, b] if covers(a, b) && covers(b, a));
         let is_parted: Vec<bool> = sides_of_part.iter().map(are_twins).collect();
-        let mut sets = DisjointSets::new(mesh.triangles.len());
-        for uses in table.edges() {
-            let is_parted = is_parted[part_of[uses[0].triangle as usize] as usize];
-            if !is_parted || goes_on(mesh, uses) {
-                uses[1..].iter().for_each(|other| sets.join(uses[0].triangle, other.triangle));
-            }
+        // Numbered by their first triangle.
+        let mut numbers = vec![None; sides];
+        let mut count = 0;
+        for (side, part) in layers.piece_of.iter_mut().zip(part_of) {
+            let sides = &sides_of_part[part as usize];
+            let first = if is_parted[part as usize] { *side } else { sides[0] };
+            *side = *numbers[first as usize].get_or_insert_with(|| {
+                count += 1;
+                count - 1
+            });
         }
-        let (piece_of, count) = sets.number();
+        let count = count as usize;
         if count < 2 {
             return None;
         }
-        layers.pieces = pieces_of(mesh, table, &piece_of, count);
-        layers.piece_of = piece_of;
+        layers.pieces = pieces_of(mesh, table, &layers.piece_of, count);
         Some(layers)
     }
 
