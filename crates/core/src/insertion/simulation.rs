@@ -74,10 +74,13 @@ impl Environment {
 
     /// In a step from one time to another, s, outside of fields.
     pub(super) fn surroundings(&self, time_s: [f64; 2]) -> Surroundings<'_> {
-        let Self { lumen, properties, sheath, stack, motion, course, flow, .. } = self;
-        let (device, motion, flow) = (stack.first(), motion.as_ref(), flow.as_ref());
-        let (course, fields, stop) = (course.as_ref(), [&[][..]; 2], None);
-        Surroundings { lumen, properties, sheath, device, stack, motion, course, flow, fields, stop, time_s }
+        Surroundings {
+            motion: self.motion.as_ref(),
+            course: self.course.as_ref(),
+            flow: self.flow.as_ref(),
+            time_s,
+            ..Surroundings::at_rest(&self.lumen, &self.properties, &self.sheath, &self.stack)
+        }
     }
 }
 

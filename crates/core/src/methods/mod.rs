@@ -67,6 +67,28 @@ pub(crate) type Timed<'a> = (&'a [Vec<Move>], &'a [f64]);
 pub(crate) type Stop = dyn Fn() -> bool + Send + Sync;
 
 impl<'a> Surroundings<'a> {
+    /// A vessel that rests, without flow and fields.
+    pub fn at_rest(
+        lumen: &'a Lumen,
+        properties: &'a WallProperties,
+        sheath: &'a Sheath,
+        stack: &'a Stack,
+    ) -> Self {
+        Self {
+            lumen,
+            properties,
+            sheath,
+            device: stack.first(),
+            stack,
+            motion: None,
+            course: None,
+            flow: None,
+            fields: [&[], &[]],
+            stop: None,
+            time_s: [0.0; 2],
+        }
+    }
+
     /// Whether the vessel moves in the step.
     pub(crate) fn moves(&self) -> bool {
         let [before, after] = self.time_s;

@@ -129,19 +129,8 @@ impl Timing {
     pub fn paper(&self, nodes: usize, dense: bool) -> Result<Vec<Row>> {
         let repeats = self.repeats;
         let (lumen, stack) = (Lumen::from(self.wall.clone()), Stack::from(self.device.clone()));
-        let surroundings = &Surroundings {
-            lumen: &lumen,
-            properties: &WallProperties::default(),
-            sheath: &self.sheath,
-            device: &self.device,
-            stack: &stack,
-            motion: None,
-            course: None,
-            flow: None,
-            fields: [&[], &[]],
-            stop: None,
-            time_s: [0.0; 2],
-        };
+        let properties = WallProperties::default();
+        let surroundings = &Surroundings::at_rest(&lumen, &properties, &self.sheath, &stack);
         let options = Li2011Options { element_mm: element_mm(nodes, repeats), ..Default::default() };
         let mut refusal = None;
         let mut dense_method = match Li2011::new(options, LinearSolver::Dense, surroundings, &NoStore) {

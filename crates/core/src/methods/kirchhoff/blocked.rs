@@ -109,20 +109,8 @@ mod tests {
         let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
         let (device, properties) = (Device::uniform(60.0, 0.4, 10.0).unwrap(), WallProperties::default());
         let lumen = Lumen::from(made.wall);
-        let stack = Stack::from(device.clone());
-        let surroundings = Surroundings {
-            lumen: &lumen,
-            properties: &properties,
-            sheath: &sheath,
-            device: &device,
-            stack: &stack,
-            motion: None,
-            course: None,
-            flow: None,
-            fields: [&[], &[]],
-            stop: None,
-            time_s: [0.0; 2],
-        };
+        let stack = Stack::from(device);
+        let surroundings = Surroundings::at_rest(&lumen, &properties, &sheath, &stack);
         let options = KirchhoffOptions::default();
         let mut wire = Kirchhoff::<{ crate::rod::PLAIN }>::new(options, &surroundings, &NoStore).unwrap();
         for _ in 0..33 {

@@ -122,19 +122,7 @@ fn nothing_is_built_where_nothing_can_touch() {
     let (made, device, sheath) = parts(4.0);
     let (lumen, stack) = (Lumen::from(made.wall), Stack::from(device));
     let properties = properties();
-    let surroundings = Surroundings {
-        lumen: &lumen,
-        properties: &properties,
-        sheath: &sheath,
-        device: stack.first(),
-        stack: &stack,
-        motion: None,
-        course: None,
-        flow: None,
-        fields: [&[], &[]],
-        stop: None,
-        time_s: [0.0; 2],
-    };
+    let surroundings = Surroundings::at_rest(&lumen, &properties, &sheath, &stack);
     let searches = |to_mm: f64| {
         let mut wire = Kirchhoff::<TWISTED>::new(method(true), &surroundings, &NoStore).unwrap();
         while wire.report().inserted_mm < to_mm {
