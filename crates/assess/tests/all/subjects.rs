@@ -179,7 +179,13 @@ fn who_stops_on_the_way_gets_the_part_of_it_that_was_covered() {
     near(until(80, &|record| record.beam = Some(vec![])), 5.0 * 70.0 / 90.0);
     let fast = |record: &mut Record| record.samples.iter_mut().for_each(|one| one.time_s /= 8.0);
     near(until(80, &fast), 20.0 * 70.0 / 90.0);
-    near(until(80, &|record| { fast(record); record.beam = Some(vec![]) }), 0.0);
+    near(
+        until(80, &|record| {
+            fast(record);
+            record.beam = Some(vec![])
+        }),
+        0.0,
+    );
 }
 
 #[test]

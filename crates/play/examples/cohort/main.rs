@@ -27,7 +27,8 @@ fn main() {
     let folder = PathBuf::from(arguments.next().expect("give a folder for the scores, as out/cohort"));
     let named: Vec<String> = arguments.collect();
     let subjects = subjects();
-    let unknown: Vec<_> = named.iter().filter(|name| !subjects.iter().any(|path| stem(path) == **name)).collect();
+    let unknown: Vec<_> =
+        named.iter().filter(|name| !subjects.iter().any(|path| stem(path) == **name)).collect();
     assert!(unknown.is_empty(), "no such subject: {unknown:?}");
     let mut table = Table::default();
     for path in subjects.iter().filter(|path| named.is_empty() || named.contains(&stem(path))) {

@@ -46,7 +46,8 @@ impl Table {
 impl Column {
     /// Least and largest score of a class.
     fn range(&self, class: Class) -> [f64; 2] {
-        let of = KINDS.iter().zip(&self.scores).filter(|(kind, _)| kind.class == class).map(|(_, score)| *score);
+        let of =
+            KINDS.iter().zip(&self.scores).filter(|(kind, _)| kind.class == class).map(|(_, score)| *score);
         [of.clone().fold(f64::MAX, f64::min), of.fold(f64::MIN, f64::max)]
     }
 
@@ -56,7 +57,10 @@ impl Column {
         for pair in Class::ALL.windows(2) {
             let ([least, _], [_, largest]) = (self.range(pair[0]), self.range(pair[1]));
             if least <= largest {
-                faults.push(format!("{:?} {least:.1} and {:?} {largest:.1} are not in order", pair[0], pair[1]));
+                faults.push(format!(
+                    "{:?} {least:.1} and {:?} {largest:.1} are not in order",
+                    pair[0], pair[1]
+                ));
             }
         }
         let [least, _] = self.range(Class::Good);
@@ -75,7 +79,8 @@ impl Column {
 
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let cells = |of: &dyn Fn(&Column) -> String| self.columns.iter().map(of).collect::<Vec<_>>().join(" | ");
+        let cells =
+            |of: &dyn Fn(&Column) -> String| self.columns.iter().map(of).collect::<Vec<_>>().join(" | ");
         writeln!(f, "| class | kind | {} |", cells(&|column| column.name.replace('_', " ")))?;
         writeln!(f, "|---|---|{}", "---|".repeat(self.columns.len()))?;
         for (row, kind) in KINDS.iter().enumerate() {
