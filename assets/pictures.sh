@@ -91,3 +91,28 @@ mended liver fluoro "$out/liver.toml" --steps 0 --time 2.0
 body=(assets/scenes/aortic_arch.toml --steps 0 --pose "RAO 20" --set c_arm.field_mm=540)
 mended skin fluoro "${body[@]}"
 mended blades fluoro "${body[@]}" --set 'c_arm.collimation_mm=[270, 297]'
+
+# Chapter 15, pairs: one picture with and without something.
+pair() { # NAME, SCENE, OPTIONS
+  "$endowire" fluoro "$2" --out "$out/pair_$1" --size 200 "${@:3}"
+  cp "$out/pair_$1/frame_000000_fluoro.png" "$to/pair_$1.png"
+}
+"$endowire" vessel from-labels assets/ct/abdomen_labels.nii.gz --label 52 --label 65 --label 66 --out "$out/aorta.stl" >/dev/null
+cat >"$out/abdomen.toml" <<END
+vessel.file = "$out/aorta.stl"
+device.file = "$PWD/assets/devices/wire_035_hydrophilic_angled.toml"
+sheath.opening = 1
+script = [{ advance_mm = 150.0, step_mm = 5.0 }]
+[view]
+views = ["fluoro"]
+c_arm = { pose = "AP", field_mm = 340.0 }
+END
+pair generated "$out/abdomen.toml" --set 'patient.torso={"diaphragm_mm":150,"breath_mm":0,"beat_mm":0}'
+pair tomogram "$out/abdomen.toml" --set "patient.ct={\"file\":\"$PWD/assets/ct/abdomen.nii.gz\"}"
+chest=(assets/scenes/arch_carotid.toml --steps 0 "${rests[@]}" --set c_arm.field_mm=300)
+pair 30_ngy "${chest[@]}"
+pair 300_ngy "${chest[@]}" --mode cine
+pair no_scatter "${chest[@]}" --mode cine --set detector.scatter_fraction=0
+pair scatter "${chest[@]}" --mode cine --set detector.scatter_fraction=0.5
+pair shaded "${chest[@]}" --mode cine --set xray.harmonised=0
+pair edges "${chest[@]}" --mode cine --set xray.edges=1

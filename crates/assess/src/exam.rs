@@ -160,7 +160,11 @@ impl Exam {
     }
 
     fn scored(&self, record: &Record, ended: Option<Ended>) -> Score {
-        Score::new(&self.subject, record, &assess(record, self.way()), ended)
+        let covered = match ended {
+            Some(Ended { by: EndedBy::Goal, .. }) => 1.0,
+            _ => self.reach.covered(record),
+        };
+        Score::new(&self.subject, record, &assess(record, self.way()), ended, covered)
     }
 
     /// Progress at the end of a record that was followed; once the subject has ended, that at its end.

@@ -115,6 +115,22 @@ impl Reach {
         Some((sample.tip_of_mm(way.instrument)? - target_mm).norm())
     }
 
+    /// Part of the way to the goal that a record has covered, 0 to 1: as far as the tip came from where it was first,
+    /// without a wrong branch, or as densely as the sac was packed.
+    pub(crate) fn covered(&self, record: &Record) -> f64 {
+        let part = match (&self.goal, &self.way) {
+            (Goal::Packing(goal), _) => {
+                let packed = record.samples.iter().filter_map(|sample| sample.packing);
+                packed.map(|packed| packed.density / goal.packing_density).fold(0.0, f64::max)
+            }
+            (Goal::Place(_), Some(way)) => {
+                way.covered(record.samples.iter().filter_map(|sample| sample.tip_of_mm(way.instrument)))
+            }
+            (Goal::Place(_), None) => 0.0,
+        };
+        part.min(1.0)
+    }
+
     /// Time at which the goal is reached, if it is in this sample, whose values hold from `so_s` on.
     pub(crate) fn reached_s(&mut self, record: &Record, sample: &Sample, so_s: f64) -> Option<f64> {
         let goal = match &self.goal {

@@ -26,20 +26,30 @@ pub enum Band {
     Reckless,
     /// Instruments were moved unseen: 5 to 10, or less with another grave fault.
     Blind,
-    /// The goal was not reached: 0.
+    /// The goal was not reached: the part of the way that was, of the least score with which it would have been
+    /// reached (40, with a grave fault 20, unseen 5 or 0).
     NotReached,
 }
 
 impl Band {
+    /// The band that faults leave to who reaches the goal.
+    fn reached(blind: bool, reckless: bool, all_met: bool) -> Self {
+        match (blind, reckless) {
+            (true, _) => Self::Blind,
+            (false, true) => Self::Reckless,
+            _ if all_met => Self::Passed,
+            _ => Self::Missed,
+        }
+    }
+
     /// The scores without any credit and with all of it.
     fn ends(self, also_reckless: bool) -> [f64; 2] {
         match (self, also_reckless) {
             (Self::Passed, _) => [80.0, 100.0],
-            (Self::Missed, _) => [40.0, 80.0],
+            (Self::Missed | Self::NotReached, _) => [40.0, 80.0],
             (Self::Reckless, _) => [20.0, 40.0],
             (Self::Blind, false) => [5.0, 10.0],
             (Self::Blind, true) => [0.0, 5.0],
-            (Self::NotReached, _) => [0.0, 0.0],
         }
     }
 }
@@ -97,8 +107,8 @@ pub struct Score {
 }
 
 impl Verdict {
-    /// The result of these measures at this end.
-    fn of(metrics: &[Scored], ended: Option<Ended>) -> Self {
+    /// The result of these measures at this end, with this part of the way covered.
+    fn of(metrics: &[Scored], ended: Option<Ended>, covered: f64) -> Self {
         let counted = || {
             let points = |one: &Scored| one.threshold.as_ref().map(|threshold| threshold.points);
             metrics.iter().filter_map(move |one| Some((one, points(one).filter(|points| *points > 0.0)?)))
@@ -107,27 +117,34 @@ impl Verdict {
         let missed = |grave: &dyn Fn(&Scored) -> bool| {
             counted().any(|(one, _)| one.passed == Some(false) && grave(one))
         };
+        let ended_by = |by: EndedBy| ended.is_some_and(|ended| ended.by == by);
         let blind = missed(&|one| one.metric.name == BLIND);
-        let reckless = missed(&|one| one.metric.name != BLIND && is_grave(one));
-        let reached = ended.is_some_and(|ended| ended.by == EndedBy::Goal);
-        let band = match (reached, blind, reckless) {
-            (false, ..) => Band::NotReached,
-            (true, true, _) => Band::Blind,
-            (true, false, true) => Band::Reckless,
-            _ if counted().all(|(one, _)| one.passed == Some(true)) => Band::Passed,
-            _ => Band::Missed,
-        };
+        // A wall that was pressed until the subject ended is as grave.
+        let reckless =
+            ended_by(EndedBy::WallForce) || missed(&|one| one.metric.name != BLIND && is_grave(one));
+        let met = counted().all(|(one, _)| one.passed == Some(true));
+        let reached = ended_by(EndedBy::Goal);
+        let band = Band::reached(blind, reckless, met && reached);
+        let [none, whole] = band.ends(reckless);
+        if !reached {
+            return Self { passed: false, score: none * covered, band: Band::NotReached, ended };
+        }
         let all = total(counted().map(|(_, points)| points));
         let brought = total(counted().map(|(one, points)| points * one.credit.unwrap_or(0.0)));
-        let [none, whole] = band.ends(reckless);
         let credit = if all > 0.0 { brought / all } else { 1.0 };
         Self { passed: band == Band::Passed, score: none + (whole - none) * credit, band, ended }
     }
 }
 
 impl Score {
-    /// The score of a record with these measures.
-    pub(crate) fn new(subject: &Subject, record: &Record, metrics: &[Metric], ended: Option<Ended>) -> Self {
+    /// The score of a record with these measures, with this part of the way to the goal covered, 0 to 1.
+    pub(crate) fn new(
+        subject: &Subject,
+        record: &Record,
+        metrics: &[Metric],
+        ended: Option<Ended>,
+        covered: f64,
+    ) -> Self {
         let scored = |metric: &Metric| {
             let threshold = subject.threshold.iter().find(|threshold| threshold.metric == metric.name);
             let judged = threshold.zip(metric.value);
@@ -137,7 +154,7 @@ impl Score {
             Scored { metric: *metric, threshold: threshold.cloned(), passed, credit, unjudged }
         };
         let metrics: Vec<Scored> = metrics.iter().map(scored).collect();
-        let verdict = Verdict::of(&metrics, ended);
+        let verdict = Verdict::of(&metrics, ended, covered);
         let not_measured = metrics
             .iter()
             .filter_map(|one| Some(Unjudged { what: one.metric.name.to_owned(), why: one.unjudged? }));

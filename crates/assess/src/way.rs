@@ -94,6 +94,16 @@ impl Way {
         (self.path.nearest(to).arc_mm - self.path.nearest(from).arc_mm).abs()
     }
 
+    /// Part of the way from the first of these places that they cover, 0 to 1, not counting those in a wrong branch.
+    pub(crate) fn covered(&self, mut places: impl Iterator<Item = Vec3>) -> f64 {
+        let arc_mm = |place: &Vec3| self.path.nearest(place).arc_mm;
+        let Some(begun_mm) = places.next().map(|place| arc_mm(&place)) else { return 0.0 };
+        let right = places.filter(|place| self.wrong_branch(place).is_none()).map(|place| arc_mm(&place));
+        let farthest_mm = right.fold(begun_mm, f64::max);
+        let way_mm = (self.path.length_mm() - begun_mm).max(f64::MIN_POSITIVE);
+        (farthest_mm - begun_mm) / way_mm
+    }
+
     /// First row of the wrong branch that a place is in, if it is deeper in it than the radius. `None` on the way.
     pub(crate) fn wrong_branch(&self, place: &Vec3) -> Option<usize> {
         let nodes = self.tree.nodes();

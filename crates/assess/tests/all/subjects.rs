@@ -121,7 +121,8 @@ fn a_record_is_scored_by_its_thresholds_until_its_goal() {
     assert_eq!((hard.verdict.band, end(&hard).unwrap().0), (Band::Missed, EndedBy::Goal));
     assert!((hard.verdict.score - (40.0 + 40.0 * 8.75 / 11.0)).abs() < 1e-9, "{:?}", hard.verdict);
     let rough = score(&pushed(|k| if k == 4 { 2.5 } else { 0.5 }));
-    assert_eq!((rough.verdict.passed, rough.verdict.score), (false, 0.0));
+    assert_eq!((rough.verdict.passed, rough.verdict.band), (false, Band::NotReached));
+    assert!((rough.verdict.score - 20.0 * 30.0 / 90.0).abs() < 1e-9, "{:?}", rough.verdict);
     assert_eq!(end(&rough), Some((EndedBy::WallForce, 4.0)));
 
     // What is reported alone need not be kept, and what was not measured is not kept.
@@ -153,14 +154,38 @@ fn a_record_is_scored_by_its_thresholds_until_its_goal() {
     assert!(nothing.unjudged.iter().any(|one| one.what == "catheter_ahead_s"), "{:?}", nothing.unjudged);
     assert!(nothing.unjudged.iter().all(|one| one.why == "nothing was done in the session"));
 
-    // What comes after the end does not count, and who stops before it has no score.
+    // What comes after the end does not count.
     let mut longer = pushed(|_| 0.5);
     longer.samples.push(Sample { time_s: 40.0, wall_force_n: 9.0, ..longer.samples[9].clone() });
     assert_eq!(score(&longer), clean);
-    let mut shorter = pushed(|_| 0.5);
-    shorter.samples.truncate(8);
-    let left = score(&shorter);
-    assert_eq!((left.verdict.passed, left.verdict.score, left.verdict.ended), (false, 0.0, None));
+}
+
+#[test]
+fn who_stops_on_the_way_gets_the_part_of_it_that_was_covered() {
+    let until = |mm: usize, change: &dyn Fn(&mut Record)| {
+        let mut record = pushed(|_| 0.5);
+        record.samples.truncate(mm / 10);
+        change(&mut record);
+        let verdict = score(&record).verdict;
+        assert_eq!((verdict.passed, verdict.band, verdict.ended), (false, Band::NotReached, None), "{mm}");
+        verdict.score
+    };
+    // From 10 mm to 100 mm. Going back takes nothing off.
+    let near = |score: f64, expected: f64| assert!((score - expected).abs() < 1e-9, "{score} {expected}");
+    near(until(80, &|_| ()), 40.0 * 70.0 / 90.0);
+    near(until(80, &|record| record.samples[7].tip_mm = record.samples[3].tip_mm), 40.0 * 60.0 / 90.0);
+    near(until(10, &|_| ()), 0.0);
+    // Unseen, and too fast as well.
+    near(until(80, &|record| record.beam = Some(vec![])), 5.0 * 70.0 / 90.0);
+    let fast = |record: &mut Record| record.samples.iter_mut().for_each(|one| one.time_s /= 8.0);
+    near(until(80, &fast), 20.0 * 70.0 / 90.0);
+    near(
+        until(80, &|record| {
+            fast(record);
+            record.beam = Some(vec![])
+        }),
+        0.0,
+    );
 }
 
 #[test]

@@ -41,6 +41,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let frames = args.count as usize;
     let plan = Plan::new("fluoro", &args.frames, (&args.scene, &scene), ViewChoice::Fluoro, folder, frames)?;
+    plan.check_free((0..plan.frames()).map(still_name))?;
     // An empty vessel needs no wall for contact, which takes far longer to compute than a picture.
     let mut simulation = match steps {
         0 => None,
@@ -73,7 +74,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
             _ => {}
         }
         studio.draw(&Still {
-            name: format!("frame_{k:06}"),
+            name: still_name(k),
             moment: Moment {
                 frame: FrameTime { frame: k as u64, time_s },
                 shape: &now.shape,
@@ -95,6 +96,11 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     written.tell(args.frames.json)?;
     let allowed = args.convergence.allow_unconverged;
     scenes::check_converged(args.scene.display(), &now.tally, taken, allowed, kept)
+}
+
+/// Beginning of the names of the files of a frame.
+fn still_name(k: usize) -> String {
+    format!("frame_{k:06}")
 }
 
 /// The state in which frames are drawn.

@@ -64,6 +64,11 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let largest = shown.iter().map(|step| largest_force_n(&contact_views(&recording, step - earlier)));
     let plan = plan.with_forces_up_to(largest.fold(0.0, f64::max));
     let plan = plan.at(&(0..frames).map(|k| moment(k).time_s).collect::<Vec<_>>());
+    let still_name = |k: usize| match one {
+        true => format!("step_{:06}_frame_{k:06}", steps[0]),
+        false => format!("step_{:06}", steps[k]),
+    };
+    plan.check_free((0..frames).map(still_name))?;
     let injections = InjectionRow::read(&args.dir)?;
     let injections = injections.iter().map(flowing);
     let mut studio = Studio::new(plan, wall, injections, (&scene, &cache))?;
@@ -83,7 +88,6 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
             let displacement = vessel.at(reported, time_s);
             studio.follow_tip(Seen { shape: &shape, inserted_mm, time_s }, displacement.as_ref())?;
         }
-        let ending = if one { format!("_frame_{k:06}") } else { String::new() };
         let contacts = contact_views(&recording, step - earlier);
         let shape = recording.shape(step - earlier);
         let inserted_mm = lengths.after(step, &shape)?;
@@ -99,7 +103,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         // The vessel rests too in a step that is drawn several times.
         let displacement = vessel.at(step, ended_s(step));
         studio.draw(&Still {
-            name: format!("step_{step:06}{ending}"),
+            name: still_name(k),
             moment: Moment {
                 frame: moment(k),
                 shape: &shape,

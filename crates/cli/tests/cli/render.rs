@@ -167,7 +167,7 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_remedy() {
     std::fs::write(&nan, pose).unwrap();
     let still = |more: &[&'static str]| [&["fluoro", text(&scene), "--steps", "0"], more].concat();
     // Each message names key, value and remedy.
-    let cases: [(Vec<&str>, &[&str]); 28] = [
+    let cases: [(Vec<&str>, &[&str]); 29] = [
         (vec!["render", text(&nothing)], &["nothing", "recorded run"]),
         (vec!["render", text(&run), "--pose", "north 3"], &["north 3", "say angles as in \"LAO 40\""]),
         (
@@ -204,6 +204,10 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_remedy() {
         (
             still(&["--set", "patient.ct={\"file\":\"none.nii\"}"]),
             &["view.patient.ct.file = ", "none.nii", "No such file"],
+        ),
+        (
+            still(&["--set", "c_arm.collimation_mm=[0.1, 20]"]),
+            &["view.c_arm.collimation_mm = [0.1, 20]: leaves ", " pixels open at the detector"],
         ),
         (still(&["--size", "5000"]), &["view.size_px = [5000, 5000]: each side must be 1 to 4096 pixels"]),
         (
@@ -373,6 +377,28 @@ fn frames_leave_the_files_of_others() {
         assert!(draw().status.success());
     }
     assert_eq!(png_size(&frame), (24, 16));
+}
+
+#[test]
+fn frames_stay_until_those_that_replace_them_can_be_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, run) = recorded(folder.path());
+    let draw = |more: &[&str]| {
+        let few = ["--from", "106", "--view", "fluoro", "--size", "24x16"];
+        endowire(&[&["render", text(&run)], &few[..], more].concat())
+    };
+    assert!(draw(&[]).status.success());
+    let frame = run.join("render/step_000106_fluoro.png");
+    let before = std::fs::read(&frame).unwrap();
+    // Blades that leave nothing open are found when all that a picture needs is there.
+    let refused = draw(&["--set", "c_arm.collimation_mm=[0.1, 20]"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert!(!said(&refused).contains("replaces"), "{}", said(&refused));
+    assert_eq!(std::fs::read(&frame).unwrap(), before);
+    // The twin: what can be drawn replaces it.
+    let drawn = draw(&["--pose", "LAO 40"]);
+    assert!(said(&drawn).contains("replaces 1 files of an earlier endowire render"), "{}", said(&drawn));
+    assert_ne!(std::fs::read(&frame).unwrap(), before);
 }
 
 #[test]

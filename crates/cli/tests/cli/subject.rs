@@ -267,7 +267,9 @@ fn who_pushes_on_in_a_wrong_branch_is_stopped() {
     std::fs::write(&reference, pushes).unwrap();
     let shipped = assets().join("subjects/references/right_hepatic.toml");
     let (score, _) = failed("right_hepatic", folder.path(), &[(text(&shipped), text(&reference))]);
-    assert_eq!((&score["ended"]["by"], &score["score"]), (&json!("wall_force"), &json!(0.0)));
+    assert_eq!((&score["ended"]["by"], &score["band"]), (&json!("wall_force"), &json!("not_reached")));
+    // Part of the way, of what a grave fault leaves.
+    assert!((5.0..20.0).contains(&score["score"].as_f64().unwrap()), "{}", score["score"]);
     assert_eq!(metric(&score, "wall_force_n")["passed"], json!(false));
 }
 

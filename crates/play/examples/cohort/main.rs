@@ -1,72 +1,83 @@
 //! A cohort of simulated trainees in the training subjects, the score of each kind, and how well scores tell those whom a
 //! teacher would pass from the others (area under the receiver operating characteristic):
-//! `cargo run --release -p endowire-play --example cohort -- left_carotid`, or without a name in all of them.
+//! `cargo run --release -p endowire-play --example cohort -- out/cohort left_carotid`, or without a name in all of them.
+//!
+//! Each score is kept in the folder as soon as it is there, and is not computed again: a run that was stopped goes on.
+//! After a change, give a new folder.
 
 #![allow(clippy::unwrap_used, reason = "a subject that cannot be played is to stop it")]
 
+mod kept;
 mod plan;
+mod table;
 mod trainee;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
 
-use endowire_assess::auc;
+use kept::{Kept, Row};
 use plan::Place;
-use trainee::{Class, KINDS};
+use table::Table;
+use trainee::KINDS;
 
 fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let folder = PathBuf::from(arguments.next().expect("give a folder for the scores, as out/cohort"));
+    let named: Vec<String> = arguments.collect();
+    let subjects = subjects();
+    let unknown: Vec<_> =
+        named.iter().filter(|name| !subjects.iter().any(|path| stem(path) == **name)).collect();
+    assert!(unknown.is_empty(), "no such subject: {unknown:?}");
+    let mut table = Table::default();
+    for path in subjects.iter().filter(|path| named.is_empty() || named.contains(&stem(path))) {
+        let name = stem(path);
+        println!("{name}");
+        let kept = Kept::open(&folder, &name);
+        finish(path, &kept);
+        let rows = kept.rows();
+        rows.iter().for_each(|row| println!("  {row}"));
+        println!("  {:.0} s of computing", rows.iter().map(|row| row.took_s).sum::<f64>());
+        table.add(&name, &rows);
+    }
+    println!("\n{table}");
+}
+
+/// The files of all subjects, in the order of their names.
+fn subjects() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/subjects");
-    let named: Vec<String> = std::env::args().skip(1).collect();
     let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.retain(|path| path.extension().is_some_and(|end| end == "toml"));
     files.sort();
-    // Scores of novices and of experts, in all subjects.
-    let mut all = [vec![], vec![]];
-    for path in files {
-        let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
-        if !named.is_empty() && !named.contains(&stem) {
-            continue;
-        }
-        let place = Place::of(&path);
-        let plan = place.plan();
-        println!("{stem}");
-        let (mut scores, mut by_kind) = ([vec![], vec![]], vec![]);
-        for kind in &KINDS {
-            let score = kind.score(&place, &plan);
-            let verdict = &score.verdict;
-            scores[usize::from(kind.class.passes())].push(verdict.score);
-            by_kind.push(verdict.score);
-            let missed = score.asked().filter(|(one, _)| one.passed != Some(true));
-            let missed: Vec<String> =
-                missed.map(|(one, _)| format!("{} {}", one.metric.name, one.value_words())).collect();
-            let of = |name: &str| {
-                score.metrics.iter().find(|one| one.metric.name == name).and_then(|one| one.metric.value)
-            };
-            println!(
-                "  {:<9} {:<18} {:>5.1}  {:<8} {:>6.1} s  {:>7.1} µGy  {}",
-                format!("{:?}", kind.class),
-                kind.name,
-                verdict.score,
-                verdict.ended.map_or("left", |ended| match ended.by {
-                    endowire_assess::EndedBy::Goal => "goal",
-                    _ => "limit",
-                }),
-                of("total_s").unwrap_or(0.0),
-                of("entrance_ugy").unwrap_or(0.0),
-                missed.join(", ")
-            );
-        }
-        let order = Class::ALL.map(|class| {
-            let of =
-                KINDS.iter().zip(&by_kind).filter(|(kind, _)| kind.class == class).map(|(_, score)| *score);
-            (of.clone().fold(f64::MAX, f64::min), of.fold(f64::MIN, f64::max))
-        });
-        let ordered = order.windows(2).all(|pair| pair[0].0 > pair[1].1);
-        println!(
-            "  AUC {:.3}, {}",
-            auc(&scores[0], &scores[1]),
-            if ordered { "in order" } else { "not in order" }
-        );
-        all.iter_mut().zip(scores).for_each(|(all, scores)| all.extend(scores));
+    files
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap().to_string_lossy().into_owned()
+}
+
+/// Computes the scores that are not kept yet, on all cores.
+fn finish(path: &Path, kept: &Kept) {
+    let rows = kept.rows();
+    let left: Vec<_> =
+        KINDS.iter().filter(|kind| !rows.iter().any(|row| row.kind.name == kind.name)).collect();
+    if left.is_empty() {
+        return;
     }
-    println!("all subjects: AUC {:.3}", auc(&all[0], &all[1]));
+    let plan = Place::of(path).plan();
+    let (next, kept) = (AtomicUsize::new(0), Mutex::new(kept));
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                let place = Place::of(path);
+                while let Some(kind) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let begun = Instant::now();
+                    let score = kind.score(&place, &plan);
+                    let row = Row::of(kind, &score, begun.elapsed().as_secs_f64());
+                    kept.lock().unwrap().add(&row);
+                }
+            });
+        }
+    });
 }

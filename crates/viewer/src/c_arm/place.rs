@@ -1,5 +1,6 @@
 //! Position of a C-arm, and its pixel pitch.
 
+use endowire_core::error::number;
 use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result, Vec3};
 
@@ -11,11 +12,15 @@ pub(super) const FILL: f64 = 0.92;
 /// Side of the corners that are cut off a square for a regular octagon, in halves of its side: 2 − √2.
 const OCTAGON: f64 = 2.0 - std::f64::consts::SQRT_2;
 
+/// Fewest pixels between blades: in the middle of an even number of pixels, of fewer none is wholly open.
+const LEAST_OPEN_PX: f64 = 2.0;
+
 impl CArm {
     /// Positions a C-arm; what `spec` leaves open is chosen so that `wall` fills the frame.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if the vessel is not between source and detector. `spec` must be valid.
+    /// [`Error::Parameter`] if the vessel is not between source and detector, and for blades that leave no pixel open.
+    /// `spec` must be valid.
     pub(crate) fn new(spec: &CArmSpec, size_px: [u32; 2], wall: &SurfaceMesh) -> Result<Self> {
         let (low, high) = wall.bounds_mm().ok_or_else(|| Error::Mesh("the wall has no vertices".into()))?;
         let angles_deg = spec.angles_deg();
@@ -47,6 +52,7 @@ impl CArm {
         };
         arm.pixel_mm = whole / spec.magnification;
         check_pitch(spec, size_px, arm.pixel_mm)?;
+        check_opening(spec, arm.pixel_mm)?;
         arm.opening_px = spec.collimation_mm.map(|sides| sides.map(|side| side / 2.0 / arm.pixel_mm));
         if spec.shutter == Shutter::Octagon {
             let field = size_px.map(|side| f64::from(side) / 2.0);
@@ -91,6 +97,20 @@ impl CArm {
         );
         Err(Error::parameter("view.c_arm.sod_mm", self.sod_mm, remedy))
     }
+}
+
+/// Refuses blades between which no pixel is wholly open: the frame would be black.
+fn check_opening(spec: &CArmSpec, pixel_mm: f64) -> Result<()> {
+    let Some(open_mm) = spec.collimation_mm else { return Ok(()) };
+    let narrow = open_mm.iter().map(|side| side / pixel_mm).find(|px| *px < LEAST_OPEN_PX);
+    let Some(px) = narrow else { return Ok(()) };
+    let remedy = format!(
+        "leaves {px:.2} pixels open at the detector, each {pixel_mm:.3} mm wide; leave at least {LEAST_OPEN_PX} open ({:.2} mm), or \
+         draw more pixels",
+        LEAST_OPEN_PX * pixel_mm
+    );
+    let [width, height] = open_mm.map(number);
+    Err(Error::parameter("view.c_arm.collimation_mm", format!("[{width}, {height}]"), remedy))
 }
 
 /// Rejects pixels outside the computable range, naming the responsible key.

@@ -66,6 +66,26 @@ fn a_rotation_turns_the_picture_clockwise_and_magnification_enlarges_it() {
 }
 
 #[test]
+fn blades_that_leave_no_pixel_open_are_refused_with_their_width() {
+    let wall = SurfaceMesh {
+        vertices_mm: vec![Vec3::new(-5.0, -4.0, -3.0), Vec3::new(5.0, 4.0, 3.0)],
+        triangles: vec![],
+    };
+    let between = |width: f64| {
+        let spec =
+            CArmSpec { pixel_mm: Some(0.25), collimation_mm: Some([width, 20.0]), ..CArmSpec::default() };
+        CArm::new(&spec, [64, 64], &wall)
+    };
+    let refused = between(0.1).unwrap_err().to_string();
+    let told = "view.c_arm.collimation_mm = [0.1, 20]: leaves 0.40 pixels open at the detector, each 0.250 mm wide; leave at least 2 \
+                open (0.50 mm)";
+    assert!(refused.starts_with(told), "{refused}");
+    // The twin: two pixels are open, and the two in the middle are wholly so.
+    let arm = between(0.5).unwrap();
+    assert_eq!([30, 31, 32, 33].map(|x| arm.openness(32 * 64 + x)), [0.0, 1.0, 1.0, 0.0]);
+}
+
+#[test]
 fn nearer_to_the_source_is_larger() {
     let arm = arm(0.0, 0.0);
     let at = |y| arm.project(&Vec3::new(10.0, y, 0.0))[0] - 300.0;

@@ -75,6 +75,7 @@ const LEAST_FORCE_N: f64 = 1e-6;
 /// The frames to draw with the options of the command line, checked before anything is computed.
 pub(super) struct Plan<'a> {
     args: &'a FrameArgs,
+    command: &'static str,
     /// File of the scene.
     scene_file: PathBuf,
     spec: ViewSpec,
@@ -86,10 +87,10 @@ pub(super) struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    /// Plans `frames` frames, or those of a turn with a given speed, of a scene. They go to `folder`, where they
+    /// Plans `frames` frames, or those of a turn with a given speed, of a scene. They go to `folder`, where they will
     /// replace those of an earlier call of the same command.
     pub(super) fn new(
-        command: &str,
+        command: &'static str,
         args: &'a FrameArgs,
         (path, scene): (&Path, &Scene),
         default: ViewChoice,
@@ -108,17 +109,10 @@ impl<'a> Plan<'a> {
         std::fs::create_dir_all(&folder).map_err(|e| {
             Failure::Input(format!("--out {}: {e}; name a folder that can be made", folder.display()))
         })?;
-        let begun = Manifest::begin(&folder, command);
-        let (manifest, replaced) = begun.map_err(|e| Failure::write(&folder, &e))?;
-        if replaced > 0 {
-            tell(format_args!(
-                "endowire: replaces {replaced} files of an earlier endowire {command} in {}",
-                folder.display()
-            ));
-        }
+        let manifest = Manifest::begin(&folder, command).map_err(|e| Failure::write(&folder, &e))?;
         let pace = Pace::even(spec.frames_per_s);
         let scene_file = path.to_owned();
-        Ok(Self { args, scene_file, spec, pushed, folder, frames, pace, manifest })
+        Ok(Self { args, command, scene_file, spec, pushed, folder, frames, pace, manifest })
     }
 
     /// Sets the times of the frames, instead of a constant rate.
@@ -131,6 +125,30 @@ impl<'a> Plan<'a> {
         let scale = &mut self.spec.camera.force_n;
         *scale = scale.or((largest_n >= LEAST_FORCE_N).then_some(largest_n));
         self
+    }
+
+    /// Refuses pictures whose files are there already and are not ours, by the beginnings of their names.
+    pub(super) fn check_free(&self, mut names: impl Iterator<Item = String>) -> Result<(), Failure> {
+        let views = [(View::ThreeD, "3d"), (View::Fluoro, "fluoro")];
+        let views: Vec<_> = views.into_iter().filter(|(view, _)| self.spec.wants(*view)).collect();
+        names.try_for_each(|name| {
+            views.iter().try_for_each(|(_, view)| {
+                let checked = self.manifest.check(&picture_name(&name, view));
+                checked.map_err(|e| Failure::write(&self.folder, &e))
+            })
+        })
+    }
+
+    /// Makes room for the pictures, now that all that they need is there.
+    fn replace_earlier(&mut self) -> Result<(), Failure> {
+        let replaced = self.manifest.replace().map_err(|e| Failure::write(&self.folder, &e))?;
+        if replaced > 0 {
+            let (command, folder) = (self.command, self.folder.display());
+            tell(format_args!(
+                "endowire: replaces {replaced} files of an earlier endowire {command} in {folder}"
+            ));
+        }
+        Ok(())
     }
 
     /// Number of frames to draw.
@@ -176,6 +194,7 @@ impl<'a> Studio<'a> {
         if let Some(held) = planes.first().and_then(|plane| tomogram_holds(&plane.renderer)) {
             tell(format_args!("endowire: {held}"));
         }
+        plan.replace_earlier()?;
         Ok(Self { plan, wall, planes, drawn: 0, animation: None, files: vec![] })
     }
 
@@ -309,7 +328,7 @@ impl<'a> Studio<'a> {
     fn write(&mut self, still: &Still, frames: &Frames) -> Result<(), Failure> {
         for (view, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
             if let Some(image) = image {
-                let path = self.file(&format!("{}_{view}.png", still.name))?;
+                let path = self.file(&picture_name(&still.name, view))?;
                 image.write_png(&path)?;
             }
         }
@@ -401,6 +420,11 @@ impl<'a> Studio<'a> {
         }
         Ok(())
     }
+}
+
+/// Name of the file of a view.
+fn picture_name(still: &str, view: &str) -> String {
+    format!("{still}_{view}.png")
 }
 
 /// The available arrays of a frame, with names.

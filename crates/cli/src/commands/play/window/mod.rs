@@ -30,9 +30,9 @@ use crate::failure::Failure;
 use crate::output::chart::write_png;
 use crate::output::tell;
 use screen::Layout;
-use text::{Canvas, Writer};
+use text::{Canvas, Scale, Writer};
 
-/// Initial width, with one plane and with two, and height of the window.
+/// Initial width, with one plane and with two, and height of the window: those at which text has its usual size.
 const WIDTHS: [u32; 2] = [1280, 1720];
 const HEIGHT: u32 = 860;
 /// Time after which the size of the pictures is chosen anew.
@@ -56,10 +56,28 @@ enum Event {
 #[derive(Default)]
 struct Shared {
     size: [AtomicUsize; 2],
+    /// Pixels of the screen for each of a usual one, in thousandths.
+    density: AtomicUsize,
     help: AtomicBool,
     /// Name of the connected gamepad.
     gamepad: Mutex<Option<String>>,
     picture: Mutex<Option<Picture>>,
+}
+
+impl Shared {
+    fn set_density(&self, density: f64) {
+        self.density.store((1e3 * density) as usize, Ordering::Relaxed);
+    }
+
+    /// The scale of text in a window of this size.
+    fn scale(&self, size: [usize; 2], planes: usize) -> Scale {
+        Scale::of(size, usual_size(planes), self.density.load(Ordering::Relaxed) as f64 / 1e3)
+    }
+}
+
+/// The initial size of the window.
+fn usual_size(planes: usize) -> [usize; 2] {
+    [WIDTHS[planes.min(2) - 1], HEIGHT].map(|side| side as usize)
 }
 
 /// The newest picture of the whole window.
@@ -172,11 +190,12 @@ fn draw(
         }
         let gamepad = shared.gamepad.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let help = shared.help.load(Ordering::Relaxed).then(|| help(gamepad.is_some()));
-        let canvas = screen::compose(&mut writer, shown, size, help.as_deref(), gamepad.as_deref());
+        let scale = shared.scale(size, screen::planes(&shown.moment.snapshot.readout));
+        let canvas = screen::compose(&mut writer, shown, (size, scale), help.as_deref(), gamepad.as_deref());
         if let Some(frame_ms) = sharp_ms(shown) {
             quickest_ms = quickest_ms.min(frame_ms);
             if fitted.elapsed() > FIT_EVERY {
-                fit(shown, size, quickest_ms, to);
+                fit(shown, (size, scale), quickest_ms, to);
                 (fitted, quickest_ms) = (Instant::now(), f64::INFINITY);
             }
         }
@@ -196,9 +215,9 @@ fn sharp_ms(shown: &live::Shown<'_>) -> Option<f64> {
 }
 
 /// Has live pictures drawn as large as they are shown, if there is time: other programs make some of them slow.
-fn fit(shown: &live::Shown<'_>, size: [usize; 2], quickest_ms: f64, to: &Sender<Message>) {
+fn fit(shown: &live::Shown<'_>, (size, scale): ([usize; 2], Scale), quickest_ms: f64, to: &Sender<Message>) {
     let side_px = shown.moment.snapshot.lab.fluoro().size_px[0];
-    let layout = Layout::of(size, screen::planes(&shown.moment.snapshot.readout));
+    let layout = Layout::of(size, screen::planes(&shown.moment.snapshot.readout), scale);
     let fitting = endowire_play::fitting_side(layout.side as u32, side_px, quickest_ms);
     if fitting != side_px {
         let _ = to.send(Message::Side(fitting));
@@ -214,14 +233,15 @@ pub(super) fn write(
 ) -> Result<(), String> {
     let failed = |reason: String| format!("{}: {reason}", file.display());
     let mut writer = Writer::new().ok_or_else(|| failed("the font cannot be read".to_owned()))?;
-    let width = WIDTHS[screen::planes(&snapshot.readout).min(2) - 1];
+    let usual = usual_size(screen::planes(&snapshot.readout));
+    let scale = Scale::of(usual, usual, 1.0);
     let moment = live::FrameTime { snapshot, input_at: None, step_ms: 0.0 };
     let shown =
         live::Shown { moment: &moment, fluoro, three_d: Some(three_d), failure: None, frame_ms: None };
-    let canvas = screen::compose(&mut writer, &shown, [width, HEIGHT].map(|side| side as usize), None, None);
+    let canvas = screen::compose(&mut writer, &shown, (usual, scale), None, None);
     let rgb: Vec<u8> =
         canvas.pixels.iter().flat_map(|pixel| pixel.to_be_bytes().into_iter().skip(1)).collect();
-    write_png(file, (width, HEIGHT), &rgb).map_err(|e| failed(e.to_string()))
+    write_png(file, (canvas.size[0] as u32, canvas.size[1] as u32), &rgb).map_err(|e| failed(e.to_string()))
 }
 
 /// Lines of the help on F1: keys, and those of a gamepad if one is connected.
@@ -253,6 +273,7 @@ impl Shell {
             .with_inner_size(LogicalSize::new(WIDTHS[self.planes.min(2) - 1], HEIGHT));
         let window = Arc::new(events.create_window(attributes).map_err(|e| e.to_string())?);
         let size = window.inner_size();
+        self.shared.set_density(window.scale_factor());
         self.resized(size.width, size.height);
         let context = softbuffer::Context::new(events.owned_display_handle()).map_err(|e| e.to_string())?;
         self.surface = Some(softbuffer::Surface::new(&context, window).map_err(|e| e.to_string())?);
@@ -266,7 +287,8 @@ impl Shell {
     }
 
     fn layout(&self) -> Layout {
-        Layout::of([0, 1].map(|side| self.shared.size[side].load(Ordering::Relaxed)), self.planes)
+        let size = [0, 1].map(|side| self.shared.size[side].load(Ordering::Relaxed));
+        Layout::of(size, self.planes, self.shared.scale(size, self.planes))
     }
 
     /// Shows the newest picture in the window.
@@ -360,6 +382,7 @@ impl ApplicationHandler<Event> for Shell {
         match event {
             WindowEvent::CloseRequested => events.exit(),
             WindowEvent::Resized(size) => self.resized(size.width, size.height),
+            WindowEvent::ScaleFactorChanged { scale_factor, .. } => self.shared.set_density(scale_factor),
             WindowEvent::RedrawRequested => {
                 if let Err(reason) = self.present() {
                     self.failure = Some(reason);

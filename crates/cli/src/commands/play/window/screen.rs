@@ -5,7 +5,7 @@ use endowire_viewer::{Image, Mode, PixelFormat};
 
 use super::super::live::Shown;
 use super::task;
-use super::text::{Canvas, Writer};
+use super::text::{Canvas, Scale, Writer};
 
 const BACK: u32 = 0x10_1418;
 const PANEL: u32 = 0x1a_2026;
@@ -32,8 +32,8 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    pub(super) fn of([width, height]: [usize; 2], planes: usize) -> Self {
-        let panel = PANEL_PX.min(height / 3);
+    pub(super) fn of([width, height]: [usize; 2], planes: usize, scale: Scale) -> Self {
+        let panel = scale.px(PANEL_PX).min(height / 3);
         // The 3D view gets at least two fifths of the width, or one fifth with two planes.
         let most = if planes > 1 { width * 2 / 5 } else { width * 3 / 5 };
         let side = (height - panel).min(most);
@@ -58,21 +58,21 @@ impl Layout {
 pub(super) fn compose(
     writer: &mut Writer,
     shown: &Shown<'_>,
-    size: [usize; 2],
+    (size, scale): ([usize; 2], Scale),
     help: Option<&[Help]>,
     gamepad: Option<&str>,
 ) -> Canvas {
-    let mut canvas = Canvas::new(size);
+    let mut canvas = Canvas::new(size, scale);
     canvas.fill([0, 0], size, BACK);
     let readout = &shown.moment.snapshot.readout;
-    let layout = Layout::of(size, planes(readout));
+    let layout = Layout::of(size, planes(readout), scale);
     let side = layout.side;
     for (plane, corner) in layout.corners().enumerate() {
         match shown.fluoro.get(plane) {
             Some(image) => paint(&mut canvas, image, corner, [side; 2]),
             None => {
                 canvas.fill(corner, [side; 2], 0);
-                let at = [corner[0] + side / 2 - 150.min(side / 2), corner[1] + side / 2];
+                let at = [corner[0] + side / 2 - scale.px(150).min(side / 2), corner[1] + side / 2];
                 writer.write(&mut canvas, at, 16, FAINT, "hold SPACE for fluoroscopy, F1 for help");
             }
         }
@@ -118,34 +118,36 @@ fn over_picture(writer: &mut Writer, canvas: &mut Canvas, readout: &Readout, lay
     };
     let (state, colour) = if lab.live { (mode.to_owned(), LIVE) } else { (format!("{mode} held"), TEXT) };
     let angles = std::iter::once([lab.lao_deg, lab.cra_deg]).chain(lab.second_deg);
-    let side = layout.side;
+    let (side, scale) = (layout.side, canvas.scale);
+    let [edge, below, lamp] = [12, 26, 16].map(|px| scale.px(px));
     for ([left, top], [lao_deg, cra_deg]) in layout.corners().zip(angles) {
         let pose = format!("{}  {}", angle(lao_deg, "LAO", "RAO"), angle(cra_deg, "CRA", "CAU"));
-        shadowed(writer, canvas, [left + 12, top + 26], 18, colour, &state);
+        shadowed(writer, canvas, [left + edge, top + below], 18, colour, &state);
         if lab.live {
-            canvas.fill([left + side.saturating_sub(28), top + 12], [16, 16], LIVE);
+            canvas.fill([left + side.saturating_sub(edge + lamp), top + edge], [lamp; 2], LIVE);
         }
-        let bottom = top + side.saturating_sub(14);
-        shadowed(writer, canvas, [left + 12, bottom], 16, TEXT, &pose);
+        let bottom = top + side.saturating_sub(scale.px(14));
+        shadowed(writer, canvas, [left + edge, bottom], 16, TEXT, &pose);
         let zoom = format!("{:.0} mm", lab.field_mm);
-        shadowed(writer, canvas, [left + side.saturating_sub(90), bottom], 16, TEXT, &zoom);
+        shadowed(writer, canvas, [left + side.saturating_sub(scale.px(90)), bottom], 16, TEXT, &zoom);
     }
 }
 
 fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: Option<&str>, layout: Layout) {
     let readout = &shown.moment.snapshot.readout;
-    let (width, top) = (canvas.size[0], layout.panel);
+    let (width, top, scale) = (canvas.size[0], layout.panel, canvas.scale);
+    let [left, first, row, spacing] = [12, 28, 26, 24].map(|px| scale.px(px));
     for (line, one) in readout.instruments.iter().rev().enumerate() {
-        let y = top + 28 + 26 * line;
+        let y = top + first + row * line;
         let chosen = one.name == readout.selected;
         if chosen {
-            canvas.fill([0, y - 19], [width, 25], 0x26_3440);
+            canvas.fill([0, y - scale.px(19)], [width, scale.px(25)], 0x26_3440);
         }
         instrument(writer, canvas, one, y, chosen);
     }
     let lab = &readout.lab;
-    let y = top + 28 + 26 * readout.instruments.len() + 8;
-    writer.write(canvas, [12, y], 15, TEXT, &beam(lab));
+    let y = top + first + row * readout.instruments.len() + scale.px(8);
+    writer.write(canvas, [left, y], 15, TEXT, &beam(lab));
     let sac = readout.packing.as_ref().map_or_else(String::new, |packing| {
         // Rounding must not leave a minus sign before zero.
         let full = (1e3 * packing.density).round() / 10.0 + 0.0;
@@ -153,7 +155,7 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
     });
     let contacts = format!("contacts {}, {} in all", readout.contacts, force(readout.wall_force_n));
     let contrast = format!("contrast {:.0} ml   ", lab.contrast_ml);
-    writer.write(canvas, [12, y + 24], 15, TEXT, &[contrast, contacts, sac].concat());
+    writer.write(canvas, [left, y + spacing], 15, TEXT, &[contrast, contacts, sac].concat());
     let frame = |ms: f64| format!("   {:.1} ms a step   {ms:.1} ms a frame", shown.moment.step_ms);
     let times = [
         format!("step {}", readout.step),
@@ -162,7 +164,7 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
         gamepad.map_or_else(String::new, |name| format!("   gamepad: {name}")),
     ]
     .concat();
-    writer.write(canvas, [12, y + 48], 15, FAINT, &times);
+    writer.write(canvas, [left, y + 2 * spacing], 15, FAINT, &times);
     let reported = shown.failure.map(str::to_owned).or_else(|| {
         let shown = |event: &&endowire_play::Event| event.is_shown(readout.step, readout.time_s);
         readout.event.as_ref().filter(shown).map(|event| event.text.clone())
@@ -170,7 +172,7 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: O
     let reported = reported
         .or_else(|| readout.demonstrates.then(|| "the script is shown: move to take over".to_owned()));
     if let Some(text) = reported {
-        writer.write(canvas, [12, y + 72], 15, WARN, &text);
+        writer.write(canvas, [left, y + 3 * spacing], 15, WARN, &text);
     }
 }
 
@@ -194,14 +196,15 @@ fn instrument(writer: &mut Writer, canvas: &mut Canvas, one: &InstrumentReadout,
         "{mark} {:<12} {:>7.1} mm in  {:>8.0}°{steered}",
         one.name, one.inserted_mm, one.rotation_deg
     );
-    let x = writer.write(canvas, [12, y], 16, colour, &length);
+    let [left, gap] = [12, 20].map(|px| canvas.scale.px(px));
+    let x = writer.write(canvas, [left, y], 16, colour, &length);
     let push = one.push_force_n.map_or_else(|| "--".to_owned(), force);
     let force = format!("  push {push:>9}  torque {:>7} N·mm", signed(format!("{:.3}", one.torque_nmm)));
     let colour = if one.warns { WARN } else { TEXT };
     let x = writer.write(canvas, [x, y], 16, colour, &force);
-    let x = if one.warns { writer.write(canvas, [x + 20, y], 16, WARN, "LIMIT") } else { x };
+    let x = if one.warns { writer.write(canvas, [x + gap, y], 16, WARN, "LIMIT") } else { x };
     if one.behind_mm.abs() >= LAG_MM {
-        writer.write(canvas, [x + 20, y], 16, FAINT, &format!("hand {:+.1} mm ahead", one.behind_mm));
+        writer.write(canvas, [x + gap, y], 16, FAINT, &format!("hand {:+.1} mm ahead", one.behind_mm));
     }
 }
 
@@ -227,15 +230,17 @@ fn signed(number: String) -> String {
 
 /// Keys, which begin with those of [`endowire_play::KEYS`]; those that do nothing now are faint, with the reason.
 fn show_help(writer: &mut Writer, canvas: &mut Canvas, help: &[Help], idle: &[IdleKey]) {
-    let size = [canvas.size[0].saturating_sub(48).min(1180), 22 * help.len() + 24];
-    canvas.fill([24, 24], size, 0x08_0c10);
+    let scale = canvas.scale;
+    let [edge, spacing, first, column] = [24, 22, 52, 270].map(|px| scale.px(px));
+    let width = canvas.size[0].saturating_sub(2 * edge).min(scale.px(1180));
+    canvas.fill([edge; 2], [width, spacing * help.len() + edge], 0x08_0c10);
     for (line, (keys, what)) in help.iter().enumerate() {
-        let y = 52 + 22 * line;
+        let y = first + spacing * line;
         let why = endowire_play::idle_words(line, idle);
-        writer.write(canvas, [40, y], 15, if why.is_some() { FAINT } else { CHOSEN }, keys);
-        let end = writer.write(canvas, [270, y], 15, if why.is_some() { FAINT } else { TEXT }, what);
+        writer.write(canvas, [scale.px(40), y], 15, if why.is_some() { FAINT } else { CHOSEN }, keys);
+        let end = writer.write(canvas, [column, y], 15, if why.is_some() { FAINT } else { TEXT }, what);
         if let Some(why) = why {
-            writer.write(canvas, [end.max(560) + 20, y], 15, FAINT, &why);
+            writer.write(canvas, [end.max(scale.px(560)) + scale.px(20), y], 15, FAINT, &why);
         }
     }
 }
@@ -245,11 +250,12 @@ fn shadowed(
     writer: &mut Writer,
     canvas: &mut Canvas,
     [x, y]: [usize; 2],
-    size: u32,
+    size: usize,
     colour: u32,
     text: &str,
 ) {
-    writer.write(canvas, [x + 1, y + 1], size, 0, text);
+    let off = canvas.scale.px(1);
+    writer.write(canvas, [x + off, y + off], size, 0, text);
     writer.write(canvas, [x, y], size, colour, text);
 }
 
@@ -301,12 +307,13 @@ mod tests {
     fn windows_of_any_size_have_a_place_for_all() {
         for size in [[1280, 800], [1, 1], [3, 900], [900, 3], [4000, 2000]] {
             for planes in [1, 2] {
-                let layout = Layout::of(size, planes);
+                let layout = Layout::of(size, planes, Scale::of(size, [1280, 860], 1.0));
                 assert!(planes * layout.side <= size[0] && layout.side <= size[1], "{layout:?}");
                 assert!(layout.three_d.0[0] + layout.three_d.1[0] <= size[0], "{layout:?}");
                 assert_eq!(layout.plane_at((planes * layout.side) as f64 + 0.5, 0.0), None);
             }
-            let [one, two] = [1, 2].map(|planes| Layout::of([1280, 860], planes));
+            let usual = [1280, 860];
+            let [one, two] = [1, 2].map(|planes| Layout::of(usual, planes, Scale::of(usual, usual, 1.0)));
             assert_eq!((one.plane_at(600.0, 5.0), two.plane_at(600.0, 5.0)), (Some(0), Some(1)));
             assert_eq!(two.plane_at(600.0, 600.0), None, "below the pictures");
         }
@@ -314,12 +321,32 @@ mod tests {
 
     #[test]
     fn text_and_boxes_at_the_edge_do_not_leave_the_picture() {
-        let mut canvas = Canvas::new([20, 10]);
+        let usual = Scale::of([20, 10], [20, 10], 1.0);
+        let mut canvas = Canvas::new([20, 10], usual);
         let mut writer = Writer::new().unwrap();
         canvas.fill([15, 5], [100, 100], 0xff_ffff);
         assert_eq!(canvas.pixels.iter().filter(|pixel| **pixel != 0).count(), 25);
         let end = writer.write(&mut canvas, [2, 8], 15, 0xff_0000, "wire 12.5 mm");
         assert!(end > 50 && canvas.pixels.iter().any(|pixel| pixel & 0xff_0000 != 0));
+    }
+
+    #[test]
+    fn text_grows_with_the_window_and_with_the_density_of_its_screen() {
+        let usual = [1280, 860];
+        let width = |size: [usize; 2], density: f64| {
+            let mut canvas = Canvas::new([900, 40], Scale::of(size, usual, density));
+            Writer::new().unwrap().write(&mut canvas, [0, 30], 15, 0xff_ffff, "beam 00:12.5")
+        };
+        let one = width(usual, 1.0);
+        for (size, density, times) in [
+            ([2560, 1720], 1.0, 2),
+            ([2560, 1720], 2.0, 2),
+            ([1280, 860], 2.0, 2),
+            ([390, 800], 1.0, 1),
+            ([3840, 860], 1.0, 1),
+        ] {
+            assert!(width(size, density).abs_diff(times * one) <= times, "{size:?} {density}");
+        }
     }
 
     #[test]

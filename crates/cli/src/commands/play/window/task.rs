@@ -6,8 +6,8 @@ use super::screen::{CHOSEN, TEXT, WARN};
 use super::text::{Canvas, Writer};
 use crate::subjects::verdict;
 
-/// Font size, width of a letter and line spacing, pixels.
-const LETTER_PX: u32 = 15;
+/// Font size, width of a letter and line spacing, pixels at the usual size.
+const LETTER_PX: usize = 15;
 const COLUMN_PX: usize = 9;
 const LINE_PX: usize = 22;
 const MARGIN_PX: usize = 12;
@@ -47,8 +47,9 @@ fn write(
     lines: &[Line],
     ([left, top], [width, height]): ([usize; 2], [usize; 2]),
 ) {
-    let columns = width.saturating_sub(2 * MARGIN_PX) / COLUMN_PX;
-    let room = height.saturating_sub(MARGIN_PX) / LINE_PX;
+    let [margin, column, spacing] = [MARGIN_PX, COLUMN_PX, LINE_PX].map(|px| canvas.scale.px(px));
+    let columns = width.saturating_sub(2 * margin) / column;
+    let room = height.saturating_sub(margin) / spacing;
     if columns == 0 {
         return;
     }
@@ -56,9 +57,9 @@ fn write(
         .iter()
         .flat_map(|(colour, text)| wrapped(text, columns).into_iter().map(move |line| (*colour, line)));
     let lines: Vec<Line> = lines.take(room).collect();
-    canvas.fill([left, top], [width, LINE_PX * lines.len() + MARGIN_PX], BACK);
+    canvas.fill([left, top], [width, spacing * lines.len() + margin], BACK);
     for (number, (colour, line)) in lines.iter().enumerate() {
-        let at = [left + MARGIN_PX, top + LINE_PX * (number + 1)];
+        let at = [left + margin, top + spacing * (number + 1)];
         writer.write(canvas, at, LETTER_PX, *colour, line);
     }
 }

@@ -8,11 +8,30 @@ use ab_glyph::{Font, FontRef, ScaleFont, point};
 pub(super) struct Canvas {
     pub(super) size: [usize; 2],
     pub(super) pixels: Vec<u32>,
+    /// How large text is drawn, and the room for it.
+    pub(super) scale: Scale,
+}
+
+/// Pixels for each one in a window of the usual size and density.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Scale(f64);
+
+impl Scale {
+    /// That of a window: text grows with both of its sides, and is never smaller than on its screen elsewhere.
+    pub(super) fn of(size: [usize; 2], usual: [usize; 2], density: f64) -> Self {
+        let [wide, high] = [0, 1].map(|side| size[side] as f64 / usual[side] as f64);
+        Self(wide.min(high).max(density).max(1.0))
+    }
+
+    /// So many pixels of the usual size.
+    pub(super) fn px(self, usual: usize) -> usize {
+        (usual as f64 * self.0).round() as usize
+    }
 }
 
 impl Canvas {
-    pub(super) fn new(size: [usize; 2]) -> Self {
-        Self { size, pixels: vec![0; size[0] * size[1]] }
+    pub(super) fn new(size: [usize; 2], scale: Scale) -> Self {
+        Self { size, pixels: vec![0; size[0] * size[1]], scale }
     }
 
     /// Fills a rectangle, clipped to the picture.
@@ -60,15 +79,17 @@ impl Writer {
         Some(Self { font, glyphs: HashMap::new() })
     }
 
-    /// Writes a line from a position on its base line; returns where it ends.
+    /// Writes a line from a position on its base line, with letters of `usual_px` at the usual size; returns where it
+    /// ends.
     pub(super) fn write(
         &mut self,
         canvas: &mut Canvas,
         [x, y]: [usize; 2],
-        size_px: u32,
+        usual_px: usize,
         colour: u32,
         text: &str,
     ) -> usize {
+        let size_px = canvas.scale.px(usual_px) as u32;
         let mut pen = x as f32;
         for c in text.chars() {
             let font = &self.font;
