@@ -1,13 +1,15 @@
 //! Detects a vessel narrower than the device that is pushed into it.
 //!
-//! A device is blocked if no sphere of its radius can pass ahead of its front (`contact/passage.rs`). Any other
-//! missing equilibrium is reported as a failed computation. A yielding wall lets a device through a vessel somewhat
-//! narrower than itself; this is not an error.
+//! A device is blocked if no sphere of its radius can pass ahead of its front (`contact/passage.rs`), and either there is no
+//! equilibrium, or one only where the wall yields by half of the device's radius. Any other missing equilibrium is reported as a
+//! failed computation. A wall that yields by less lets a device through a vessel somewhat narrower than itself; this is not an
+//! error.
 
 use super::Environment;
 use super::configuration::Start;
 use super::hands::lengths;
 use super::mesh::Mesh;
+use super::state::KirchhoffState;
 use crate::contact::passage::{Narrow, narrow_ahead};
 use crate::device::line_mm;
 use crate::methods::Command;
@@ -47,11 +49,30 @@ pub(super) fn refuse_wedged(
     from: Start<'_>,
     commands: &[Command],
 ) -> Result<()> {
-    let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
-    if from.state.deepest_mm() < environment.options.tuning.passage.wedged * thinnest_mm {
+    if is_wedged(environment, from.state) { refuse_narrow(environment, from, commands) } else { Ok(()) }
+}
+
+/// As [`refuse_narrow`], for a part that ends wedged deeper than it began: a stiff device would be forced through any gap beside a
+/// plug or a membrane, however narrow, since the energy of a yielding wall is finite.
+///
+/// # Errors
+/// As [`refuse_narrow`].
+pub(super) fn refuse_forced(
+    environment: &Environment<'_>,
+    from: Start<'_>,
+    to: &KirchhoffState,
+    commands: &[Command],
+) -> Result<()> {
+    if to.deepest_mm() <= from.state.deepest_mm() || !is_wedged(environment, to) {
         return Ok(());
     }
     refuse_narrow(environment, from, commands)
+}
+
+/// Whether a device has sunk into the wall by a good part of its radius.
+fn is_wedged(environment: &Environment<'_>, state: &KirchhoffState) -> bool {
+    let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
+    state.deepest_mm() >= environment.options.tuning.passage.wedged * thinnest_mm
 }
 
 /// The narrow passage ahead of an instrument, if any, and the instrument's radius there.
