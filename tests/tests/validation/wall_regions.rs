@@ -19,9 +19,9 @@ fn patch(modulus: f64) -> WallRegion {
     WallRegion {
         centre_mm: Some(OUTER),
         radius_mm: Some(10.0),
-            modulus_n_per_mm2: Some(modulus),
-    ..WallRegion::default()
-        }
+        modulus_n_per_mm2: Some(modulus),
+        ..WallRegion::default()
+    }
 }
 
 /// A wall of one modulus.
@@ -209,17 +209,13 @@ fn sunk_mm(soft_at: [f64; 3]) -> f64 {
     let setup = WallRodSpec { length: 40.0, bending: 160.0, radius: 0.45, elements: 80, modulus: 100.0 };
     // The clot's top is flat below the whole rod, which begins at the depth that 0.02 N/mm gives at 1 N/mm².
     let top = DEPTH_MM - setup.radius;
-    let mut surface =
-        SurfaceMesh::cuboid(Vec3::new(-30.0, -20.0, -20.0), Vec3::new(70.0, 20.0, 20.0), 2.0);
+    let mut surface = SurfaceMesh::cuboid(Vec3::new(-30.0, -20.0, -20.0), Vec3::new(70.0, 20.0, 20.0), 2.0);
     let clot = SurfaceMesh::cuboid(Vec3::new(-12.0, top - 8.0, -12.0), Vec3::new(52.0, top, 12.0), 1.0);
     let first = surface.vertices_mm.len() as u32;
     surface.vertices_mm.extend(clot.vertices_mm);
     surface.triangles.extend(clot.triangles.into_iter().map(|triangle| triangle.map(|v| v + first)));
-    let soft = WallRegion {
-        piece_at_mm: Some(soft_at),
-        modulus_n_per_mm2: Some(1.0),
-        ..WallRegion::default()
-    };
+    let soft =
+        WallRegion { piece_at_mm: Some(soft_at), modulus_n_per_mm2: Some(1.0), ..WallRegion::default() };
     let properties = WallProperties { deviation_mm: 0.0, region: vec![soft], ..wall(setup.modulus) };
     let straight = Frame::new(Vec3::x(), Some(Vec3::y()));
     let walls = Wall::from_surface(&surface).unwrap();

@@ -171,7 +171,7 @@ fn vessel(wanted: &Path, frame: SurfaceFrame, folder: &Path) -> Result<Vessel, F
         )));
     }
     let wall = Wall::from_surface(&SurfaceMesh::read(wanted, frame)?)?;
-    for hint in wall_hints(&wall, frame.unit_mm)? {
+    for hint in wall_hints(&wall, frame.unit_mm) {
         tell(format_args!("{}: {hint}", wanted.display()));
     }
     let mut file = PathBuf::from("vessel");

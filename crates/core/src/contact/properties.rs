@@ -140,10 +140,13 @@ impl WallProperties {
     pub(crate) fn at_vertices(&self, query: &WallQuery) -> Vec<(f64, f64)> {
         let pieces = Pieces::of(query.mesh());
         let mut values = vec![(0.0, self.friction); query.mesh().vertices_mm.len()];
-        let blended = |was: f64, own: f64, share: f64| if share == 1.0 { own } else { was + (own - was) * share };
+        let blended =
+            |was: f64, own: f64, share: f64| if share == 1.0 { own } else { was + (own - was) * share };
         for region in &self.region {
             let shares = region.shares(query, &pieces);
-            for ((ln_modulus, friction), share) in values.iter_mut().zip(shares).filter(|(_, share)| *share > 0.0) {
+            for ((ln_modulus, friction), share) in
+                values.iter_mut().zip(shares).filter(|(_, share)| *share > 0.0)
+            {
                 if let Some(modulus) = region.modulus_n_per_mm2 {
                     *ln_modulus = blended(*ln_modulus, libm::log(modulus / self.modulus_n_per_mm2), share);
                 }
@@ -197,7 +200,9 @@ impl WallProperties {
             let name = format!("vessel.wall.region[{index}]");
             let key = |key: &str| format!("{name}.{key}");
             for (of, place) in [("centre_mm", region.centre_mm), ("piece_at_mm", region.piece_at_mm)] {
-                if let Some(place) = place.map(Vec3::from).filter(|place| place.iter().any(|c| !c.is_finite())) {
+                if let Some(place) =
+                    place.map(Vec3::from).filter(|place| place.iter().any(|c| !c.is_finite()))
+                {
                     return Err(Error::parameter(key(of), vector(&place), "must be finite numbers"));
                 }
             }
@@ -218,7 +223,11 @@ impl WallProperties {
                 }
                 Some(Place::Piece(_)) => {
                     let remedy = "a piece has no edge where it could change: leave transition_mm out";
-                    return Err(Error::parameter(key("transition_mm"), region.transition_mm.unwrap_or(0.0), remedy));
+                    return Err(Error::parameter(
+                        key("transition_mm"),
+                        region.transition_mm.unwrap_or(0.0),
+                        remedy,
+                    ));
                 }
                 None => {
                     let given = [
@@ -228,7 +237,8 @@ impl WallProperties {
                     ];
                     let given: Vec<&str> = given.iter().filter(|(_, is)| *is).map(|(key, _)| *key).collect();
                     let given = if given.is_empty() { "no place".to_owned() } else { given.join(" and ") };
-                    let remedy = "give centre_mm and radius_mm of a sphere, or piece_at_mm, a place on a piece";
+                    let remedy =
+                        "give centre_mm and radius_mm of a sphere, or piece_at_mm, a place on a piece";
                     return Err(Error::parameter(name, given, remedy));
                 }
             }

@@ -242,7 +242,11 @@ pub fn check_repaired(
         vertices: surface.vertices_mm.len() - merged,
         duplicate_vertices: merged,
         components: report.components,
-        pieces: Pieces::of(wall.mesh()).reports(wall.mesh()),
+        pieces: if wall.report().components > 1 {
+            Pieces::of(wall.mesh()).reports(wall.mesh())
+        } else {
+            Vec::new()
+        },
         watertight: open_edges == 0 && non_manifold_edges == 0,
         open_edges,
         stray_edges: report.stray_edges,

@@ -1,6 +1,7 @@
 //! The vessel that devices are pushed into.
 
 pub mod anatomy;
+mod boxes;
 mod centreline;
 mod check;
 mod conditioning;

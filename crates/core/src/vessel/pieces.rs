@@ -28,12 +28,7 @@ pub(crate) struct Pieces {
 
 impl Pieces {
     pub(crate) fn of(mesh: &SurfaceMesh) -> Self {
-        Self::with_edges(mesh, &EdgeTable::new(&mesh.triangles))
-    }
-
-    /// Of a mesh with these edges.
-    pub(super) fn with_edges(mesh: &SurfaceMesh, edges: &EdgeTable) -> Self {
-        let (of_triangle, count) = edges.components(mesh.triangles.len());
+        let (of_triangle, count) = EdgeTable::new(&mesh.triangles).components(mesh.triangles.len());
         Self { of_triangle, count }
     }
 
@@ -64,11 +59,8 @@ impl Pieces {
         belongs
     }
 
-    /// Size and place of each piece of `mesh`, the largest first; none of a single one.
+    /// Size and place of each piece of `mesh`, the largest first.
     pub(super) fn reports(&self, mesh: &SurfaceMesh) -> Vec<PieceReport> {
-        if self.count < 2 {
-            return Vec::new();
-        }
         let boxes = of_groups(RepairKind::PieceApart, mesh, |t| Some(self.of_triangle[t]));
         // The middle of the triangle nearest to that of the box, which itself may be in the lumen.
         let mut nearest = vec![(f64::INFINITY, Vec3::zeros()); self.count];
@@ -128,6 +120,9 @@ mod tests {
             assert!(of == piece && away_mm < 1e-9, "{report:?}");
         }
         let belongs = pieces.vertices_of(cube.0, mesh);
-        assert!(mesh.vertices_mm.iter().zip(&belongs).all(|(v, of)| *of == (v.y > 0.05 && v.y < 4.2 && v.z > 19.0 && v.z < 25.0 && v.x > 2.9 && v.x < 7.1)));
+        assert!(
+            mesh.vertices_mm.iter().zip(&belongs).all(|(v, of)| *of
+                == (v.y > 0.05 && v.y < 4.2 && v.z > 19.0 && v.z < 25.0 && v.x > 2.9 && v.x < 7.1))
+        );
     }
 }

@@ -3,6 +3,7 @@
 use std::cell::LazyCell;
 use std::f64::consts::PI;
 
+use super::boxes::Tree;
 use super::{Wall, WallQuery};
 use crate::{Result, Vec3};
 
@@ -92,7 +93,8 @@ pub fn survey(wall: &Wall, septum_mm: f64) -> Result<Survey> {
     for t in (0..mesh.triangles.len()).step_by(every) {
         let (at, inward) = (wall.mesh().middle(t), query.inward_normal(t as u32));
         septa.asked += 1;
-        if let Some(half) = half_chord(&query, (at, inward), size_mm) {
+        let first_met = |from: &Vec3| query.first_met(from, &inward, size_mm).map(|(mm, _)| mm);
+        if let Some(half) = half_chord(first_met, (at, inward), size_mm) {
             chords.push((half, at + inward * half));
         }
         let back = query.first_met(&(at - inward * off_mm), &-inward, septum_mm);
@@ -121,11 +123,15 @@ pub fn survey(wall: &Wall, septum_mm: f64) -> Result<Survey> {
     Ok(Survey { lumen, septa, start })
 }
 
-/// Half the distance from a position on the wall along its inward normal to the opposite wall, mm.
-fn half_chord(query: &WallQuery, (at, inward): (Vec3, Vec3), size_mm: f64) -> Option<f64> {
+/// Half the distance from a position on the wall along its inward normal to the opposite wall, mm; `first_met` says how far away
+/// a ray along the normal meets it.
+fn half_chord(
+    first_met: impl Fn(&Vec3) -> Option<f64>,
+    (at, inward): (Vec3, Vec3),
+    size_mm: f64,
+) -> Option<f64> {
     let off_mm = OFF * size_mm;
-    let (mm, _) = query.first_met(&(at + inward * off_mm), &inward, size_mm)?;
-    Some((mm + off_mm) / 2.0)
+    Some((first_met(&(at + inward * off_mm))? + off_mm) / 2.0)
 }
 
 /// Largest number of triangles sampled for the median alone.
@@ -133,19 +139,21 @@ const FEW_SAMPLES: usize = 1000;
 
 /// Median half chord along inward normals of the wall, mm, as in [`LumenReport`] but from fewer triangles; `None`
 /// without any hit.
-///
-/// # Errors
-/// As [`survey`].
-pub(super) fn median_half_lumen_mm(wall: &Wall) -> Result<Option<f64>> {
+pub(super) fn median_half_lumen_mm(wall: &Wall) -> Option<f64> {
     let mesh = wall.mesh();
-    let query = WallQuery::new(wall)?;
+    // So few rays are not worth the structures of a query.
+    let boxes = Tree::new(mesh, (0..mesh.triangles.len() as u32).collect());
     let size_mm = mesh.used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
     let every = mesh.triangles.len().div_ceil(FEW_SAMPLES).max(1);
     let asked = (0..mesh.triangles.len()).step_by(every);
-    let place = |t: usize| (wall.mesh().middle(t), query.inward_normal(t as u32));
-    let mut chords: Vec<f64> = asked.filter_map(|t| half_chord(&query, place(t), size_mm)).collect();
+    let chord = |t: usize| {
+        let [a, b, c] = mesh.corners(t);
+        let inward = (c - a).cross(&(b - a)).try_normalize(0.0).unwrap_or_else(Vec3::x);
+        half_chord(|from| boxes.first_met(mesh, from, &inward, size_mm), (mesh.middle(t), inward), size_mm)
+    };
+    let mut chords: Vec<f64> = asked.filter_map(chord).collect();
     chords.sort_by(f64::total_cmp);
-    Ok(chords.get(chords.len().saturating_sub(1) / 2).copied())
+    chords.get(chords.len().saturating_sub(1) / 2).copied()
 }
 
 /// Whether one triangle is reached from the other across a few edges.

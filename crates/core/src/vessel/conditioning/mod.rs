@@ -76,7 +76,9 @@ impl Conditioning {
 
     fn check(&self) -> Result<()> {
         if !(self.deviation_mm > 0.0 && self.deviation_mm <= LARGEST_DEVIATION_MM) {
-            let remedy = format!("must be above 0 and at most {LARGEST_DEVIATION_MM}: how far the wall may be moved, mm");
+            let remedy = format!(
+                "must be above 0 and at most {LARGEST_DEVIATION_MM}: how far the wall may be moved, mm"
+            );
             return Err(Error::parameter("deviation_mm", self.deviation_mm, remedy));
         }
         if self.most_triangles == 0 {
