@@ -5,6 +5,7 @@
 
 use super::SurfaceMesh;
 use super::intersect::ray_meets;
+use super::query::distance_to_triangle;
 use crate::Vec3;
 
 /// Triangles in a leaf of the tree.
@@ -89,42 +90,60 @@ impl Tree {
         }
     }
 
-    /// How far away a ray first meets a triangle of `mesh`, mm along the unit vector `way`, up to `reach_mm`.
+    /// The first hit of a ray on a triangle of `mesh`, up to `reach_mm` along the unit vector `way`: its distance, mm, and the
+    /// triangle.
     pub(super) fn first_met(
         &self,
         mesh: &SurfaceMesh,
         from: &Vec3,
         way: &Vec3,
         reach_mm: f64,
-    ) -> Option<f64> {
+    ) -> Option<(f64, u32)> {
         let per_way = way.map(|c| 1.0 / c);
         let entry_mm = |[low, high]: &[Vec3; 2]| {
             let (low, high) = ((low - from).component_mul(&per_way), (high - from).component_mul(&per_way));
             // A ray in the plane of a side has NaN there, which `min` and `max` leave out.
             let begin = (0..3).fold(0.0, |begin: f64, k| begin.max(low[k].min(high[k])));
             let end = (0..3).fold(f64::INFINITY, |end: f64, k| end.min(low[k].max(high[k])));
-            (begin <= end).then_some(begin)
+            if begin <= end { begin } else { f64::INFINITY }
         };
-        let mut nearest = None;
-        let mut stack = vec![1];
-        while let Some(node) = stack.pop() {
-            let best = nearest.unwrap_or(reach_mm);
-            if entry_mm(&self.nodes[node]).is_none_or(|entry| entry > best) {
+        self.least(reach_mm, entry_mm, |t| ray_meets(from, way, mesh.corners(t as usize)))
+    }
+
+    /// Distance of a position from the nearest triangle of `mesh`, mm; `None` without any.
+    pub(super) fn distance_mm(&self, mesh: &SurfaceMesh, x: &Vec3) -> Option<f64> {
+        let gap_mm = |[low, high]: &[Vec3; 2]| (low - x).sup(&(x - high)).sup(&Vec3::zeros()).norm();
+        let to = |t: u32| Some(distance_to_triangle(&mesh.corners(t as usize), x));
+        self.least(f64::INFINITY, gap_mm, to).map(|(mm, _)| mm)
+    }
+
+    /// The triangle of the least value up to `most`, with a lower bound of the values in a box.
+    fn least(
+        &self,
+        most: f64,
+        bound: impl Fn(&[Vec3; 2]) -> f64,
+        value: impl Fn(u32) -> Option<f64>,
+    ) -> Option<(f64, u32)> {
+        let mut best: Option<(f64, u32)> = None;
+        let mut stack = vec![(bound(&self.nodes[1]), 1)];
+        while let Some((least, node)) = stack.pop() {
+            let limit = best.map_or(most, |(value, _)| value);
+            if least > limit || least == f64::INFINITY {
                 continue;
             }
             if node < self.leaves {
+                let [first, second] =
+                    [2 * node, 2 * node + 1].map(|child| (bound(&self.nodes[child]), child));
                 // The nearer half first.
-                let is_later = entry_mm(&self.nodes[2 * node]) > entry_mm(&self.nodes[2 * node + 1]);
-                let (first, second) = (2 * node + usize::from(is_later), 2 * node + usize::from(!is_later));
-                stack.extend([second, first]);
+                stack.extend(if first.0 > second.0 { [first, second] } else { [second, first] });
                 continue;
             }
             for (_, t) in self.leaf(node - self.leaves) {
-                let met = ray_meets(from, way, mesh.corners(t as usize));
-                nearest = met.filter(|mm| *mm <= nearest.unwrap_or(reach_mm)).or(nearest);
+                let limit = best.map_or(most, |(value, _)| value);
+                best = value(t).filter(|value| *value <= limit).map(|value| (value, t)).or(best);
             }
         }
-        nearest
+        best
     }
 
     /// The triangles of a leaf, each with its position in the order.
@@ -167,12 +186,14 @@ mod tests {
                 way[k as usize % 3] = 0.0;
             }
             let (way, reach_mm) = (way.normalize(), 100.0 * (number(6) + 0.5));
-            let found = boxes.first_met(mesh, &from, &way, reach_mm);
+            let found = boxes.first_met(mesh, &from, &way, reach_mm).map(|(mm, _)| mm);
             let expected = query.first_met(&from, &way, reach_mm).map(|(mm, _)| mm);
             assert_eq!(found.is_some(), expected.is_some(), "{from} {way}");
             let off_mm = found.zip(expected).map_or(0.0, |(a, b)| (a - b).abs());
             assert!(off_mm < 1e-9, "{from} {way}: {found:?} {expected:?}");
             *(if found.is_some() { &mut met } else { &mut missed }) += 1;
+            let nearest = query.nearest(&from, f64::MAX).unwrap().distance_mm.abs();
+            assert!((boxes.distance_mm(mesh, &from).unwrap() - nearest).abs() < 1e-9, "{from}");
         }
         assert!(met > 300 && missed > 300, "{met} met it, {missed} did not");
     }

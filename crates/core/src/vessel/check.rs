@@ -228,7 +228,7 @@ pub fn check_repaired(
         false => *edges.select_nth_unstable_by(k, f64::total_cmp).1,
     });
     let (report, repair) = (given.as_ref().unwrap_or(wall.report()), wall.report().clone());
-    let survey = survey(&wall, septum_mm)?;
+    let survey = survey(&wall, septum_mm);
     let volume_mm3 = wall.volume_mm3();
     let rounding_mm3 = flat_volume_mm3(wall.mesh());
     let contrast = repair.stray_edges + repair.non_manifold_edges + repair.one_sided_edges == 0

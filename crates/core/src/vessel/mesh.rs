@@ -112,6 +112,12 @@ pub(crate) fn area(corners: &[Vec3; 3]) -> f64 {
     (b - a).cross(&(c - a)).norm() / 2.0
 }
 
+/// Unit inward normal of a triangle; an arbitrary direction where undefined.
+pub(super) fn inward_normal(mesh: &SurfaceMesh, triangle: usize) -> Vec3 {
+    let [a, b, c] = mesh.corners(triangle);
+    (c - a).cross(&(b - a)).try_normalize(0.0).unwrap_or_else(Vec3::x)
+}
+
 /// Unit inward normals of vertices, weighted by angle; an arbitrary direction where undefined.
 pub(crate) fn inward_vertex_normals(mesh: &SurfaceMesh) -> Vec<Vec3> {
     let inward = |outward: Vec3| if outward == Vec3::zeros() { Vec3::x() } else { -outward };
