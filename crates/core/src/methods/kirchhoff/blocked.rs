@@ -9,7 +9,6 @@ use super::Environment;
 use super::configuration::Start;
 use super::hands::lengths;
 use super::mesh::Mesh;
-use super::state::KirchhoffState;
 use crate::contact::passage::{Narrow, narrow_ahead};
 use crate::device::line_mm;
 use crate::methods::Command;
@@ -49,30 +48,44 @@ pub(super) fn refuse_wedged(
     from: Start<'_>,
     commands: &[Command],
 ) -> Result<()> {
-    if is_wedged(environment, from.state) { refuse_narrow(environment, from, commands) } else { Ok(()) }
+    let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
+    if from.state.deepest_mm() < environment.options.tuning.passage.wedged * thinnest_mm {
+        return Ok(());
+    }
+    refuse_narrow(environment, from, commands)
 }
 
-/// As [`refuse_narrow`], for a part that ends wedged deeper than it began: a stiff device would be forced through any gap beside a
-/// plug or a membrane, however narrow, since the energy of a yielding wall is finite.
+/// As [`refuse_narrow`], for a part whose front ends wedged deeper than it began: a stiff device would be forced through any gap
+/// beside a plug or a membrane, however narrow, since the energy of a yielding wall is finite.
 ///
 /// # Errors
 /// As [`refuse_narrow`].
 pub(super) fn refuse_forced(
     environment: &Environment<'_>,
     from: Start<'_>,
-    to: &KirchhoffState,
+    to: Start<'_>,
     commands: &[Command],
 ) -> Result<()> {
-    if to.deepest_mm() <= from.state.deepest_mm() || !is_wedged(environment, to) {
-        return Ok(());
-    }
-    refuse_narrow(environment, from, commands)
+    let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
+    let wedged_mm = environment.options.tuning.passage.wedged * thinnest_mm;
+    let is_forced = |instrument: usize| {
+        let deep_mm = deepest_mm(environment, to, instrument);
+        deep_mm >= wedged_mm && deep_mm > deepest_mm(environment, from, instrument)
+    };
+    if (0..commands.len()).any(is_forced) { refuse_narrow(environment, from, commands) } else { Ok(()) }
 }
 
-/// Whether a device has sunk into the wall by a good part of its radius.
-fn is_wedged(environment: &Environment<'_>, state: &KirchhoffState) -> bool {
-    let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
-    state.deepest_mm() >= environment.options.tuning.passage.wedged * thinnest_mm
+/// Deepest penetration of the front of an instrument into the wall, mm; 0 without contact. What presses far behind it, in a bend,
+/// says nothing about the passage ahead.
+fn deepest_mm(environment: &Environment<'_>, Start { mesh, state }: Start<'_>, instrument: usize) -> f64 {
+    let lengths_mm: Vec<f64> = lengths(&state.hands).collect();
+    let tip_mm = line_mm(lengths_mm.iter().copied()) - lengths_mm[instrument];
+    let radius_mm = environment.surroundings.stack.outermost_radius_mm(&lengths_mm, tip_mm);
+    let front_mm = tip_mm..=tip_mm + environment.options.tuning.passage.front as f64 * radius_mm;
+    let at_front = state.touches.iter().filter(|(point, _)| {
+        mesh.points.get(*point).is_some_and(|point| front_mm.contains(&point.from_tip_mm))
+    });
+    at_front.fold(0.0, |deepest_mm, (_, touch)| touch.contact.penetration_mm.max(deepest_mm))
 }
 
 /// The narrow passage ahead of an instrument, if any, and the instrument's radius there.
