@@ -48,8 +48,7 @@ pub(super) fn refuse_wedged(
     from: Start<'_>,
     commands: &[Command],
 ) -> Result<()> {
-    let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
-    if from.state.deepest_mm() < environment.options.tuning.passage.wedged * thinnest_mm {
+    if from.state.deepest_mm() < wedged_mm(environment) {
         return Ok(());
     }
     refuse_narrow(environment, from, commands)
@@ -66,13 +65,22 @@ pub(super) fn refuse_forced(
     to: Start<'_>,
     commands: &[Command],
 ) -> Result<()> {
-    let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
-    let wedged_mm = environment.options.tuning.passage.wedged * thinnest_mm;
+    let wedged_mm = wedged_mm(environment);
+    // Nearly always, and without allocating.
+    if to.state.deepest_mm() < wedged_mm {
+        return Ok(());
+    }
     let is_forced = |instrument: usize| {
         let deep_mm = deepest_mm(environment, to, instrument);
         deep_mm >= wedged_mm && deep_mm > deepest_mm(environment, from, instrument)
     };
     if (0..commands.len()).any(is_forced) { refuse_narrow(environment, from, commands) } else { Ok(()) }
+}
+
+/// Penetration from which a device counts as wedged, mm.
+fn wedged_mm(environment: &Environment<'_>) -> f64 {
+    let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
+    environment.options.tuning.passage.wedged * thinnest_mm
 }
 
 /// Deepest penetration of the front of an instrument into the wall, mm; 0 without contact. What presses far behind it, in a bend,
