@@ -1,9 +1,8 @@
 //! Detects a vessel narrower than the device that is pushed into it.
 //!
-//! A device is blocked if no sphere of its radius can pass ahead of its front (`contact/passage.rs`), and either there is no
-//! equilibrium, or one only where the wall yields by half of the device's radius. Any other missing equilibrium is reported as a
-//! failed computation. A wall that yields by less lets a device through a vessel somewhat narrower than itself; this is not an
-//! error.
+//! A device is blocked if no sphere of its radius can pass ahead of its front (`contact/passage.rs`). Any other
+//! missing equilibrium is reported as a failed computation. A yielding wall lets a device through a vessel somewhat
+//! narrower than itself; this is not an error.
 
 use super::Environment;
 use super::configuration::Start;
@@ -48,52 +47,11 @@ pub(super) fn refuse_wedged(
     from: Start<'_>,
     commands: &[Command],
 ) -> Result<()> {
-    if from.state.deepest_mm() < wedged_mm(environment) {
+    let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
+    if from.state.deepest_mm() < environment.options.tuning.passage.wedged * thinnest_mm {
         return Ok(());
     }
     refuse_narrow(environment, from, commands)
-}
-
-/// As [`refuse_narrow`], for a part whose front ends wedged deeper than it began: a stiff device would be forced through any gap
-/// beside a plug or a membrane, however narrow, since the energy of a yielding wall is finite.
-///
-/// # Errors
-/// As [`refuse_narrow`].
-pub(super) fn refuse_forced(
-    environment: &Environment<'_>,
-    from: Start<'_>,
-    to: Start<'_>,
-    commands: &[Command],
-) -> Result<()> {
-    let wedged_mm = wedged_mm(environment);
-    // Nearly always, and without allocating.
-    if to.state.deepest_mm() < wedged_mm {
-        return Ok(());
-    }
-    let is_forced = |instrument: usize| {
-        let deep_mm = deepest_mm(environment, to, instrument);
-        deep_mm >= wedged_mm && deep_mm > deepest_mm(environment, from, instrument)
-    };
-    if (0..commands.len()).any(is_forced) { refuse_narrow(environment, from, commands) } else { Ok(()) }
-}
-
-/// Penetration from which a device counts as wedged, mm.
-fn wedged_mm(environment: &Environment<'_>) -> f64 {
-    let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
-    environment.options.tuning.passage.wedged * thinnest_mm
-}
-
-/// Deepest penetration of the front of an instrument into the wall, mm; 0 without contact. What presses far behind it, in a bend,
-/// says nothing about the passage ahead.
-fn deepest_mm(environment: &Environment<'_>, Start { mesh, state }: Start<'_>, instrument: usize) -> f64 {
-    let lengths_mm: Vec<f64> = lengths(&state.hands).collect();
-    let tip_mm = line_mm(lengths_mm.iter().copied()) - lengths_mm[instrument];
-    let radius_mm = environment.surroundings.stack.outermost_radius_mm(&lengths_mm, tip_mm);
-    let front_mm = tip_mm..=tip_mm + environment.options.tuning.passage.front as f64 * radius_mm;
-    let at_front = state.touches.iter().filter(|(point, _)| {
-        mesh.points.get(*point).is_some_and(|point| front_mm.contains(&point.from_tip_mm))
-    });
-    at_front.fold(0.0, |deepest_mm, (_, touch)| touch.contact.penetration_mm.max(deepest_mm))
 }
 
 /// The narrow passage ahead of an instrument, if any, and the instrument's radius there.

@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use super::Environment;
-use super::blocked::{refuse_forced, refuse_narrow, refuse_wedged};
+use super::blocked::{refuse_narrow, refuse_wedged};
 use super::carried::taken_along;
 use super::configuration::Start;
 use super::course::{Course, Next, Rest};
@@ -146,8 +146,7 @@ impl<const C: usize> Workspace<C> {
                     let there = there.displaced(reached.as_ref());
                     let line = next.state.material_line(there.wall());
                     let openings = surroundings.lumen.openings();
-                    let forced = refuse_forced(&at_start, was, next.start(), &way.commands);
-                    let goes_on = forced.and_then(|()| check_inside(openings, line, 0.0)).and_then(|()| {
+                    let goes_on = check_inside(openings, line, 0.0).and_then(|()| {
                         let to = (&*next.state, &way.target[..]);
                         beside.as_mut().map_or(Ok(()), |beside| {
                             beside.follow(tools, &there, (was, passage), (attempt, &found), to)
