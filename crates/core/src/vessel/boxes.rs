@@ -31,6 +31,22 @@ pub(super) fn meet(a: &[Vec3; 2], b: &[Vec3; 2]) -> bool {
     (0..3).all(|k| a[0][k] <= b[1][k] && b[0][k] <= a[1][k])
 }
 
+/// How far away a ray enters a box, with the inverse of its direction; infinite for one that it misses, or an empty one.
+fn entry_mm([low, high]: &[Vec3; 2], from: &Vec3, per_way: &Vec3) -> f64 {
+    if low.x > high.x {
+        return f64::INFINITY;
+    }
+    let (low, high) = ((low - from).component_mul(per_way), (high - from).component_mul(per_way));
+    let (mut begin, mut end) = (0.0_f64, f64::INFINITY);
+    for (low, high) in low.iter().zip(&high) {
+        // A ray in the plane of a side, which has no number there, is between the two.
+        if !(low.is_nan() || high.is_nan()) {
+            (begin, end) = (begin.max(low.min(*high)), end.min(low.max(*high)));
+        }
+    }
+    if begin <= end { begin } else { f64::INFINITY }
+}
+
 impl Tree {
     pub(super) fn new(mesh: &SurfaceMesh, mut members: Vec<u32>) -> Self {
         let bounds = |corners: [Vec3; 3]| {
@@ -100,13 +116,7 @@ impl Tree {
         reach_mm: f64,
     ) -> Option<(f64, u32)> {
         let per_way = way.map(|c| 1.0 / c);
-        let entry_mm = |[low, high]: &[Vec3; 2]| {
-            let (low, high) = ((low - from).component_mul(&per_way), (high - from).component_mul(&per_way));
-            // A ray in the plane of a side has NaN there, which `min` and `max` leave out.
-            let begin = (0..3).fold(0.0, |begin: f64, k| begin.max(low[k].min(high[k])));
-            let end = (0..3).fold(f64::INFINITY, |end: f64, k| end.min(low[k].max(high[k])));
-            if begin <= end { begin } else { f64::INFINITY }
-        };
+        let entry_mm = |bounds: &[Vec3; 2]| entry_mm(bounds, from, &per_way);
         self.least(reach_mm, entry_mm, |t| ray_meets(from, way, mesh.corners(t as usize)))
     }
 
@@ -132,8 +142,8 @@ impl Tree {
                 continue;
             }
             if node < self.leaves {
-                let [first, second] =
-                    [2 * node, 2 * node + 1].map(|child| (bound(&self.nodes[child]), child));
+                let bounded = |child: usize| (bound(&self.nodes[child]), child);
+                let (first, second) = (bounded(2 * node), bounded(2 * node + 1));
                 // The nearer half first.
                 stack.extend(if first.0 > second.0 { [first, second] } else { [second, first] });
                 continue;
@@ -169,6 +179,17 @@ mod tests {
     use super::*;
     use crate::random::{splitmix64, unit};
     use crate::vessel::{GeneratedWall, Resolution, WallQuery, anatomy};
+
+    #[test]
+    fn no_ray_enters_an_empty_box_or_one_beside_it() {
+        let empty = [Vec3::repeat(EMPTY[0]), Vec3::repeat(EMPTY[1])];
+        let per_way = Vec3::new(1.0, f64::INFINITY, f64::INFINITY);
+        assert_eq!(entry_mm(&empty, &Vec3::zeros(), &per_way), f64::INFINITY);
+        let at = |y: f64| [Vec3::new(2.0, y, -1.0), Vec3::new(3.0, y + 1.0, 1.0)];
+        assert_eq!(entry_mm(&at(-0.5), &Vec3::zeros(), &per_way), 2.0);
+        assert_eq!(entry_mm(&at(0.0), &Vec3::zeros(), &per_way), 2.0);
+        assert_eq!(entry_mm(&at(0.5), &Vec3::zeros(), &per_way), f64::INFINITY);
+    }
 
     #[test]
     fn rays_meet_the_wall_where_its_query_says() {
