@@ -147,7 +147,7 @@ impl Vessel {
         let made = interruptible(py, move || {
             let wall = Wall::repaired(&SurfaceMesh::read(&path, frame)?, &options)?;
             let hints = wall_hints(&wall, frame.unit_mm);
-            Ok::<_, endowire_core::Error>((wall, hints))
+            Ok::<_, Error>((wall, hints))
         })?;
         let (wall, hints) = made.map_err(exception)?;
         for hint in wall.report().repair_notes().into_iter().chain(hints) {
