@@ -51,11 +51,11 @@ fn nothing_is_allocated_in_a_step_of_an_insertion() {
         }
         let wire = Device::new(vec![tip, Section::straight(380.0, 0.445, 10.0)]).unwrap();
         let patch = WallRegion {
-            centre_mm: [41.0, 0.0, 146.0],
-            radius_mm: 10.0,
-            transition_mm: None,
+            centre_mm: Some([41.0, 0.0, 146.0]),
+            radius_mm: Some(10.0),
             modulus_n_per_mm2: Some(30.0),
             friction: Some(0.1),
+            ..WallRegion::default()
         };
         let region = if regions { vec![patch] } else { Vec::new() };
         let properties = WallProperties { friction, region, ..Default::default() };

@@ -40,11 +40,11 @@ fn on_two(moduli: [f64; 2], transition_mm: f64) -> Result<OnTwo> {
     // A ball so large that its surface is flat here.
     let radius_mm = 1e5;
     let right = WallRegion {
-        centre_mm: [HALF + radius_mm, 0.0, 0.0],
-        radius_mm,
+        centre_mm: Some([HALF + radius_mm, 0.0, 0.0]),
+        radius_mm: Some(radius_mm),
         transition_mm: Some(transition_mm),
         modulus_n_per_mm2: Some(moduli[1]),
-        friction: None,
+        ..WallRegion::default()
     };
     let setup = WallRodSpec {
         length: 2.0 * HALF,
@@ -91,11 +91,11 @@ fn rough_part(outside: f64, inside: f64, radius_mm: f64) -> (WallProperties, f64
     // The wire lies on the inner side of the bend.
     let inner = BEND - RADIUS - PLAY;
     let region = WallRegion {
-        centre_mm: [STRAIGHT + inner, BEND, 0.0],
-        radius_mm,
+        centre_mm: Some([STRAIGHT + inner, BEND, 0.0]),
+        radius_mm: Some(radius_mm),
         transition_mm: Some(1.0),
-        modulus_n_per_mm2: None,
         friction: Some(inside),
+        ..WallRegion::default()
     };
     let properties = WallProperties { region: vec![region], ..rigid(outside) };
     (properties, 4.0 * (0.5 * radius_mm / inner).asin())

@@ -146,7 +146,8 @@ impl Vessel {
         let reported = path.display().to_string();
         let made = interruptible(py, move || {
             let wall = Wall::repaired(&SurfaceMesh::read(&path, frame)?, &options)?;
-            wall_hints(&wall, frame.unit_mm).map(|hints| (wall, hints))
+            let hints = wall_hints(&wall, frame.unit_mm);
+            Ok::<_, Error>((wall, hints))
         })?;
         let (wall, hints) = made.map_err(exception)?;
         for hint in wall.report().repair_notes().into_iter().chain(hints) {

@@ -93,7 +93,7 @@ impl Surface {
             triangles: wall.mesh().triangles.len(),
             size_mm: (high - low).into(),
             notes: wall.report().notes(),
-            hints: wall_hints(&wall, unit_mm)?,
+            hints: wall_hints(&wall, unit_mm),
             inlet: wall.inlet().map(|one| one.index),
             openings: wall.openings().iter().map(hole).collect(),
         };

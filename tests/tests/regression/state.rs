@@ -53,11 +53,10 @@ fn with_friction() -> WallProperties {
 
 fn patched() -> WallProperties {
     let region = WallRegion {
-        centre_mm: [41.0, 0.0, 146.0],
-        radius_mm: 12.0,
-        transition_mm: None,
+        centre_mm: Some([41.0, 0.0, 146.0]),
+        radius_mm: Some(12.0),
         modulus_n_per_mm2: Some(50.0),
-        friction: None,
+        ..WallRegion::default()
     };
     WallProperties { region: vec![region], ..WallProperties::default() }
 }

@@ -6,7 +6,9 @@ use endowire_core::Vec3;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, StepReport, WallProperties, WallRegion};
 use endowire_core::methods::kirchhoff::{Accuracy, KirchhoffOptions};
-use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, anatomy};
+use endowire_core::shape::Frame;
+use endowire_core::statics::{WallRod, WallRodSpec};
+use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, SurfaceMesh, Wall, anatomy};
 use endowire_tests::crossing::CrossingTest;
 
 /// Where the tip passes along the outer side of the curved tube between 150 and 170 mm inserted.
@@ -15,11 +17,10 @@ const BENDING_NMM2: f64 = 10.0;
 
 fn patch(modulus: f64) -> WallRegion {
     WallRegion {
-        centre_mm: OUTER,
-        radius_mm: 10.0,
-        transition_mm: None,
+        centre_mm: Some(OUTER),
+        radius_mm: Some(10.0),
         modulus_n_per_mm2: Some(modulus),
-        friction: None,
+        ..WallRegion::default()
     }
 }
 
@@ -145,7 +146,7 @@ fn a_region_that_holds_the_vessel_is_the_wall() {
         end(WallProperties { modulus_n_per_mm2: 5.0, friction: 0.1, ..WallProperties::default() });
     let everywhere = |modulus: f64, friction: f64| WallProperties {
         region: vec![WallRegion {
-            radius_mm: 1e4,
+            radius_mm: Some(1e4),
             friction: Some(friction),
             modulus_n_per_mm2: Some(modulus),
             ..patch(modulus)
@@ -162,16 +163,17 @@ fn a_region_that_holds_the_vessel_is_the_wall() {
 fn friction_in_a_region_acts_there_and_nowhere_else() {
     let rough = WallRegion { friction: Some(0.2), modulus_n_per_mm2: None, ..patch(1.0) };
     let (_, push, report) = end(WallProperties { region: vec![rough], ..wall(1.0) });
-    let reach = rough.radius_mm + 3.0;
+    let (centre, radius) = (Vec3::from(rough.centre_mm.unwrap()), rough.radius_mm.unwrap());
+    let reach = radius + 3.0;
     let (mut inside, mut outside) = (0, 0);
     for contact in &report.contacts {
         // Contacts are on the axis, a wire's radius off the wall.
-        let away = (contact.position_mm - Vec3::from(rough.centre_mm)).norm();
+        let away = (contact.position_mm - centre).norm();
         let friction = contact.friction_n.norm() / contact.force_n;
         if away > reach {
             outside += 1;
             assert_eq!(friction, 0.0);
-        } else if away < rough.radius_mm - 3.0 && contact.force_n > 1e-6 {
+        } else if away < radius - 3.0 && contact.force_n > 1e-6 {
             inside += 1;
             assert!((friction / 0.2 - 1.0).abs() < 1e-2, "{friction}");
         }
@@ -198,4 +200,37 @@ fn a_rough_region_holds_a_device_that_is_turned_on_it() {
     // Past it nothing rubs.
     let (torque, most) = torques(20.0);
     assert!(torque.abs() < 1e-12 && most == 0.0, "{torque} of {most}");
+}
+
+/// Depth of a rod of radius 0.45 mm under 0.02 N/mm on a soft clot in a stiff artery (1 and 100 N/mm²), where the piece at this
+/// place has the modulus of the clot.
+fn sunk_mm(soft_at: [f64; 3]) -> f64 {
+    const DEPTH_MM: f64 = 0.02;
+    let setup = WallRodSpec { length: 40.0, bending: 160.0, radius: 0.45, elements: 80, modulus: 100.0 };
+    // The clot's top is flat below the whole rod, which begins at the depth that 0.02 N/mm gives at 1 N/mm².
+    let top = DEPTH_MM - setup.radius;
+    let mut surface = SurfaceMesh::cuboid(Vec3::new(-30.0, -20.0, -20.0), Vec3::new(70.0, 20.0, 20.0), 2.0);
+    let clot = SurfaceMesh::cuboid(Vec3::new(-12.0, top - 8.0, -12.0), Vec3::new(52.0, top, 12.0), 1.0);
+    let first = surface.vertices_mm.len() as u32;
+    surface.vertices_mm.extend(clot.vertices_mm);
+    surface.triangles.extend(clot.triangles.into_iter().map(|triangle| triangle.map(|v| v + first)));
+    let soft =
+        WallRegion { piece_at_mm: Some(soft_at), modulus_n_per_mm2: Some(1.0), ..WallRegion::default() };
+    let properties = WallProperties { deviation_mm: 0.0, region: vec![soft], ..wall(setup.modulus) };
+    let straight = Frame::new(Vec3::x(), Some(Vec3::y()));
+    let walls = Wall::from_surface(&surface).unwrap();
+    assert_eq!(walls.report().bodies_in_lumen, 1);
+    let mut rod = WallRod::on_wall(&walls, &properties, &setup, Vec3::zeros(), |_| straight).unwrap();
+    rod.loads.distributed = vec![(0, setup.elements, Vec3::y() * -DEPTH_MM)];
+    rod.solve().unwrap();
+    DEPTH_MM - rod.state.positions[setup.elements * 3 / 4].y
+}
+
+#[test]
+fn a_rod_sinks_into_a_soft_clot_by_load_over_modulus_and_into_a_stiff_one_a_hundredth_as_deep() {
+    let soft = sunk_mm([20.0, -4.0, 0.0]);
+    assert!((soft / 0.02 - 1.0).abs() < 1e-6, "{soft}");
+    // With the artery soft in its place.
+    let stiff = sunk_mm([20.0, -20.0, 0.0]);
+    assert!((stiff / 2e-4 - 1.0).abs() < 0.02, "{stiff}");
 }

@@ -116,7 +116,7 @@ fn start(wall: &Wall) -> Result<Option<Start>, Failure> {
     let room_mm = |x: &Vec3| query.nearest(x, f64::INFINITY).map_or(0.0, |near| near.distance_mm);
     let list = |v: [f64; 3]| format!("{v:?}");
     let Some(inlet) = wall.inlet() else {
-        let found = survey(wall, SEPTUM_MM)?.start;
+        let found = survey(wall, SEPTUM_MM).start;
         return Ok(found.map(|found| Start {
             table: format!(
                 "# The vessel is closed: a place inside, and the direction with the longest free way.\n\
@@ -171,7 +171,7 @@ fn vessel(wanted: &Path, frame: SurfaceFrame, folder: &Path) -> Result<Vessel, F
         )));
     }
     let wall = Wall::from_surface(&SurfaceMesh::read(wanted, frame)?)?;
-    for hint in wall_hints(&wall, frame.unit_mm)? {
+    for hint in wall_hints(&wall, frame.unit_mm) {
         tell(format_args!("{}: {hint}", wanted.display()));
     }
     let mut file = PathBuf::from("vessel");

@@ -139,6 +139,9 @@ pub(super) fn checked(
 /// Largest number of openings listed in the text report.
 const OPENINGS_LISTED: usize = 20;
 
+/// Largest number of pieces listed in the text report.
+const PIECES_LISTED: usize = 20;
+
 /// The report as text.
 pub(super) fn text(document: &Document) -> String {
     let r = &document.report;
@@ -223,6 +226,17 @@ fn simulated(r: &CheckReport) -> Vec<String> {
             lumen.percentile_5_mm,
             lumen.median_mm
         ));
+    }
+    for piece in r.pieces.iter().take(PIECES_LISTED) {
+        let [x, y, z] = piece.size_mm;
+        lines.push(format!(
+            "  piece                {x:.1} × {y:.1} × {z:.1} mm, {} triangles; piece_at_mm = {}",
+            piece.triangles,
+            list(&piece.at_mm)
+        ));
+    }
+    if r.pieces.len() > PIECES_LISTED {
+        lines.push(format!("    … and {} more pieces", r.pieces.len() - PIECES_LISTED));
     }
     let septa = &r.survey.septa;
     let thinnest = septa

@@ -434,7 +434,26 @@ fn a_region_of_the_wall_that_cannot_be_is_refused_by_its_key() {
         ("radius_mm = 5.0", "radius_mm = 0.0", &["region[1].radius_mm = 0", "above 0"]),
         ("radius_mm = 5.0", "radius_mm = -5.0", &["region[1].radius_mm = -5"]),
         ("radius_mm = 5.0", "radius_mm = 1e-9", &["region[1].transition_mm = 1", "1e-9 mm"]),
-        ("radius_mm = 5.0\n", "", &["line 10", "radius_mm"]),
+        (
+            "radius_mm = 5.0\n",
+            "",
+            &["vessel.wall.region[1] = centre_mm: ", "radius_mm of a sphere", "piece_at_mm"],
+        ),
+        (
+            "radius_mm",
+            "piece_at_mm = [1, 2, 3]\nradius_mm",
+            &["region[1] = centre_mm and radius_mm and piece_at_mm"],
+        ),
+        (
+            "centre_mm = [40, 4, 0]\nradius_mm = 5.0",
+            "piece_at_mm = [40, 4, 0]",
+            &["region[1].transition_mm = 1", "piece"],
+        ),
+        (
+            "centre_mm = [40, 4, 0]\nradius_mm = 5.0",
+            "piece_at_mm = [40, nan, 0]",
+            &["region[1].piece_at_mm = [40, NaN, 0]"],
+        ),
         ("= 20.0", "= -20.0", &["vessel.wall.region[1].modulus_n_per_mm2 = -20"]),
         ("= 20.0", "= 0.0", &["vessel.wall.region[1].modulus_n_per_mm2 = 0"]),
         ("= 20.0", "= 1e300", &["vessel.wall.region[1].modulus_n_per_mm2 = 1e300"]),

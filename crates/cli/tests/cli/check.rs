@@ -62,6 +62,27 @@ fn holes_are_closed_unless_they_are_meant_or_nothing_is_repaired() {
 }
 
 #[test]
+fn pieces_are_listed_with_a_place_that_names_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, place) = tube(folder.path(), "alone.stl", 0.0, None);
+    assert_eq!(reported(&check(&file, &["--json"]))["pieces"].as_array().unwrap().len(), 0);
+    assert!(!String::from_utf8(check(&file, &[]).stdout).unwrap().contains("piece_at_mm"));
+    // A clot in the middle of the lumen, beside the place on the wall.
+    let middle = Vec3::new(0.0, 0.0, place.z);
+    let clot = SurfaceMesh::cuboid(middle - Vec3::repeat(1.0), middle + Vec3::repeat(1.0), 1.0);
+    let (file, _) = tube(folder.path(), "clot.stl", 0.0, Some(clot));
+    let pieces = reported(&check(&file, &["--json"]))["pieces"].clone();
+    let size = |k: usize| pieces[k]["size_mm"][2].as_f64().unwrap();
+    assert!(pieces.as_array().unwrap().len() == 2 && size(0) > 50.0, "{pieces}");
+    assert!((size(1) - 2.0).abs() < 1e-3, "{pieces}");
+    let at: Vec<f64> = (0..3).map(|k| pieces[1]["at_mm"][k].as_f64().unwrap()).collect();
+    let off_mm = (Vec3::new(at[0], at[1], at[2]) - middle).amax();
+    assert!((off_mm - 1.0).abs() < 1e-3, "{at:?}");
+    let told = String::from_utf8(check(&file, &[]).stdout).unwrap();
+    assert!(told.contains("2.0 × 2.0 × 2.0 mm, 48 triangles; piece_at_mm = ["), "{told}");
+}
+
+#[test]
 fn a_sac_that_is_not_joined_is_no_sound_vessel() {
     let folder = tempfile::tempdir().unwrap();
     let beside = SurfaceMesh::cuboid(Vec3::new(50.0, 0.0, 0.0), Vec3::new(65.0, 15.0, 15.0), 2.0);

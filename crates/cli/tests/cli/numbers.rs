@@ -22,6 +22,8 @@ fn numbers_that_mean_nothing_are_refused_by_option_and_value() {
         (&["verify", "--stress"], "--commands"),
         (&["sweep", "none.toml", "--out", "out"], "--jobs"),
         (&["vessel", "check", tube], "--unit-mm"),
+        (&["vessel", "check", tube], "--deviation-mm"),
+        (&["vessel", "check", tube], "--septum-mm"),
         (&["vessel", "centreline", tube], "--unit-mm"),
         (&["vessel", "generate", tube, "--out", "a.stl"], "--triangles"),
         (&["vessel", "sac", tube, "--dome", "0,0,1"], "--unit-mm"),
@@ -41,6 +43,14 @@ fn numbers_that_mean_nothing_are_refused_by_option_and_value() {
     // The twin, and a place that is too far for the arithmetic of surfaces.
     let output = endowire().args(["vessel", "check", tube, "--unit-mm", "1"]).output().unwrap();
     assert!(output.status.success(), "{}", said(&output));
+    for option in ["--deviation-mm", "--septum-mm"] {
+        let output = endowire().args(["vessel", "check", tube, option, "1e9"]).output().unwrap();
+        let text = said(&output);
+        assert!(
+            output.status.code() == Some(2) && text.contains(&format!("{option} = 1e9: must be")),
+            "{text}"
+        );
+    }
     for place in ["0,0,1e30", "0,0,nan"] {
         let output = endowire().args(["vessel", "centreline", tube, "--from", place]).output().unwrap();
         let text = said(&output);

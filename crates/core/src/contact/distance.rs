@@ -287,11 +287,6 @@ impl SmoothWall {
         &self.lists.triangles
     }
 
-    /// All vertices.
-    pub(super) fn vertices_mm(&self) -> impl Iterator<Item = &Vec3> {
-        self.quadrics.iter().map(|q| &q.position)
-    }
-
     /// f alone at a point that the vertices of `list` reach, in front of the surface or behind it.
     fn reach(&self, x: &Vec3, list: &[u32]) -> Option<Reached> {
         let found = self.reach_from(x, list, None);

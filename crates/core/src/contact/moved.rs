@@ -340,11 +340,11 @@ mod tests {
         let tree = anatomy::tree("straight_tube").unwrap();
         let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(1.0)).unwrap().wall;
         let region = WallRegion {
-            centre_mm: [4.0, 0.0, 50.0],
-            radius_mm: 6.0,
+            centre_mm: Some([4.0, 0.0, 50.0]),
+            radius_mm: Some(6.0),
             transition_mm: Some(8.0),
             modulus_n_per_mm2: Some(10.0),
-            friction: None,
+            ..WallRegion::default()
         };
         let properties =
             WallProperties { deviation_mm: 0.0, region: vec![region], ..WallProperties::default() };

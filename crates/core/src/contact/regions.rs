@@ -29,6 +29,7 @@ use nalgebra::Matrix3;
 use super::properties::WallProperties;
 use super::{Distance, SmoothWall, WallPotential};
 use crate::Vec3;
+use crate::vessel::WallQuery;
 
 /// A quantity given at the vertices, with derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,12 +90,12 @@ pub(crate) struct RegionMap {
 }
 
 impl RegionMap {
-    /// The values of `properties` at the vertices of `wall`; `None` if uniform.
-    pub(super) fn new(wall: &SmoothWall, properties: &WallProperties) -> Option<Self> {
+    /// The values of `properties` at the vertices of a wall; `None` if uniform.
+    pub(super) fn new(wall: &WallQuery, properties: &WallProperties) -> Option<Self> {
         let largest = properties.largest_friction();
         let share = |friction: f64| if largest > 0.0 { friction / largest } else { 1.0 };
         let (mut ln_moduli, mut rough): (Vec<f64>, Vec<f64>) =
-            wall.vertices_mm().map(|x| properties.at(x)).map(|(ln, friction)| (ln, share(friction))).unzip();
+            properties.at_vertices(wall).into_iter().map(|(ln, friction)| (ln, share(friction))).unzip();
         if ln_moduli.iter().all(|s| *s == 0.0) {
             ln_moduli.clear();
         }
@@ -163,7 +164,7 @@ fn mean(
 mod tests {
     use super::*;
     use crate::contact::WallRegion;
-    use crate::vessel::{GeneratedWall, Resolution, WallQuery, anatomy};
+    use crate::vessel::{GeneratedWall, Resolution, anatomy};
 
     /// A tube of radius 4 mm about the z axis from 0 to 100 mm, triangles with edges of 1 mm.
     struct Tube {
@@ -177,17 +178,18 @@ mod tests {
             .unwrap()
             .wall;
         let smooth = SmoothWall::new(&wall, 4.0);
-        let regions = RegionMap::new(&smooth, properties);
-        Tube { smooth, query: WallQuery::new(&wall).unwrap(), regions }
+        let query = WallQuery::new(&wall).unwrap();
+        let regions = RegionMap::new(&query, properties);
+        Tube { smooth, query, regions }
     }
 
     fn region(height_mm: f64, modulus: Option<f64>, friction: Option<f64>) -> WallRegion {
         WallRegion {
-            centre_mm: [4.0, 0.0, height_mm],
-            radius_mm: 6.0,
-            transition_mm: None,
+            centre_mm: Some([4.0, 0.0, height_mm]),
+            radius_mm: Some(6.0),
             modulus_n_per_mm2: modulus,
             friction,
+            ..WallRegion::default()
         }
     }
 

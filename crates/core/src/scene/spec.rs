@@ -545,10 +545,10 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// [`wall_hints`](crate::vessel::wall_hints); none for a wall from a tree.
     ///
     /// # Errors
-    /// As [`wall_hints`](crate::vessel::wall_hints).
+    /// As [`Lumen::wall`].
     pub fn hints(&self, lumen: &Lumen) -> Result<Vec<String>> {
         match lumen {
-            Lumen::Meshed(_) => wall_hints(lumen.wall(&NoStore)?, self.vessel.frame().unit_mm),
+            Lumen::Meshed(_) => Ok(wall_hints(lumen.wall(&NoStore)?, self.vessel.frame().unit_mm)),
             Lumen::Swept(_) => Ok(Vec::new()),
         }
     }

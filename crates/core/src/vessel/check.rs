@@ -3,6 +3,7 @@
 use super::crossings::crossings;
 use super::extract::handles;
 use super::hints::{opening_hints, unit_hint};
+use super::pieces::{PieceReport, Pieces};
 use super::survey::{Survey, survey};
 use super::topology::EdgeTable;
 use super::wall::{duplicate_pairs, flat_volume_mm3};
@@ -42,6 +43,8 @@ pub struct CheckReport {
     pub duplicate_vertices: usize,
     /// Pieces connected by edges.
     pub components: usize,
+    /// The pieces of the repaired wall, the largest first; empty if it is one.
+    pub pieces: Vec<PieceReport>,
     /// Whether every edge belongs to exactly two triangles.
     pub watertight: bool,
     /// Edges of a single triangle.
@@ -109,6 +112,8 @@ pub struct CheckReport {
 
 /// Thickness in mm below which [`check`] counts septa: that of a vessel's wall.
 const SEPTUM_MM: f64 = 1.0;
+/// Largest such thickness, mm: that between organs.
+const LARGEST_SEPTUM_MM: f64 = 100.0;
 
 impl CheckReport {
     /// Whether a device can be simulated in this wall as it is: consistent, outward, manifold, free of faults,
@@ -178,7 +183,7 @@ pub fn check(surface: &SurfaceMesh) -> Result<CheckReport> {
 /// As [`check`], for a surface read with `unit_mm`, which hints name, and with septa counted below `septum_mm`.
 ///
 /// # Errors
-/// As [`check`], and [`Error::Parameter`] for a thickness that is not a number of 0 or more.
+/// As [`check`], and [`Error::Parameter`] for a thickness that is not from 0 to 100.
 pub(crate) fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result<CheckReport> {
     check_repaired(surface, unit_mm, septum_mm, &RepairOptions::default())
 }
@@ -193,8 +198,9 @@ pub fn check_repaired(
     septum_mm: f64,
     repair: &RepairOptions,
 ) -> Result<CheckReport> {
-    if !(septum_mm.is_finite() && septum_mm >= 0.0) {
-        return Err(Error::parameter("septum_mm", septum_mm, "must be a thickness in mm, 0 or more"));
+    if !(0.0..=LARGEST_SEPTUM_MM).contains(&septum_mm) {
+        let remedy = format!("must be a thickness from 0 to {LARGEST_SEPTUM_MM} mm");
+        return Err(Error::parameter("septum_mm", septum_mm, remedy));
     }
     let welding = Welding::of(surface)?;
     let wall = Wall::repaired_from(welding.clone(), repair)?;
@@ -222,7 +228,7 @@ pub fn check_repaired(
         false => *edges.select_nth_unstable_by(k, f64::total_cmp).1,
     });
     let (report, repair) = (given.as_ref().unwrap_or(wall.report()), wall.report().clone());
-    let survey = survey(&wall, septum_mm)?;
+    let survey = survey(&wall, septum_mm);
     let volume_mm3 = wall.volume_mm3();
     let rounding_mm3 = flat_volume_mm3(wall.mesh());
     let contrast = repair.stray_edges + repair.non_manifold_edges + repair.one_sided_edges == 0
@@ -236,6 +242,11 @@ pub fn check_repaired(
         vertices: surface.vertices_mm.len() - merged,
         duplicate_vertices: merged,
         components: report.components,
+        pieces: if wall.report().components > 1 {
+            Pieces::of(wall.mesh()).reports(wall.mesh())
+        } else {
+            Vec::new()
+        },
         watertight: open_edges == 0 && non_manifold_edges == 0,
         open_edges,
         stray_edges: report.stray_edges,

@@ -1,16 +1,13 @@
 //! Triangles of a surface that intersect.
 //!
-//! Triangles are sorted along a space-filling curve (Morton), and a binary tree of boxes is built over that order:
-//! this takes one sort, and neighbours are adjacent. Nearly all pairs with overlapping boxes are neighbours of a
-//! smooth surface; simple tests in plain arithmetic, each with a margin far above its rounding, exclude most of them
-//! before exact predicates decide.
+//! Nearly all pairs with overlapping boxes ([`super::boxes`]) are neighbours of a smooth surface; simple tests in plain
+//! arithmetic, each with a margin far above its rounding, exclude most of them before exact predicates decide.
 
+use super::boxes::{LEAF, Tree, meet};
 use super::intersect::triangles_intersect;
 use super::{SurfaceMesh, sliver};
 use crate::Vec3;
 
-/// Triangles in a leaf of the tree.
-const LEAF: usize = 4;
 /// Limits of the number of pairs of close triangles tested, per triangle and in all: a sound mesh needs about twenty
 /// each.
 const TRIES_EACH: usize = 64;
@@ -25,97 +22,6 @@ pub(crate) struct Crossings {
     pub(crate) pairs: Vec<[u32; 2]>,
     /// Whether a limit stopped the search: there may be more.
     pub(crate) capped: bool,
-}
-
-struct Tree {
-    /// Triangles in the order of the curve.
-    order: Vec<u32>,
-    /// Bounds of the triangles, in the order of the curve.
-    boxes: Vec<[Vec3; 2]>,
-    /// Bounds of the nodes: node k has children 2k and 2k + 1, leaves begin at `leaves`.
-    nodes: Vec<[Vec3; 2]>,
-    leaves: usize,
-}
-
-const EMPTY: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
-
-fn join(a: [Vec3; 2], b: &[Vec3; 2]) -> [Vec3; 2] {
-    [a[0].inf(&b[0]), a[1].sup(&b[1])]
-}
-
-fn meet(a: &[Vec3; 2], b: &[Vec3; 2]) -> bool {
-    (0..3).all(|k| a[0][k] <= b[1][k] && b[0][k] <= a[1][k])
-}
-
-impl Tree {
-    fn new(mesh: &SurfaceMesh, mut members: Vec<u32>) -> Self {
-        let bounds = |corners: [Vec3; 3]| {
-            let [a, b, c] = corners;
-            [a.inf(&b).inf(&c), a.sup(&b).sup(&c)]
-        };
-        let boxes: Vec<[Vec3; 2]> = (0..mesh.triangles.len()).map(|i| bounds(mesh.corners(i))).collect();
-        let empty = [Vec3::repeat(EMPTY[0]), Vec3::repeat(EMPTY[1])];
-        let all = members.iter().fold(empty, |all, i| join(all, &boxes[*i as usize]));
-        let scale =
-            (all[1] - all[0]).map(|side| if side > 0.0 { f64::from((1 << 20) - 1) / side } else { 0.0 });
-        let code = |i: u32| {
-            let [low, high] = boxes[i as usize];
-            let cell = ((low + high) / 2.0 - all[0]).component_mul(&scale);
-            spread(cell.x as u64) | spread(cell.y as u64) << 1 | spread(cell.z as u64) << 2
-        };
-        let mut keyed: Vec<(u64, u32)> = members.drain(..).map(|i| (code(i), i)).collect();
-        keyed.sort_unstable();
-        let order: Vec<u32> = keyed.into_iter().map(|(_, i)| i).collect();
-        let boxes: Vec<[Vec3; 2]> = order.iter().map(|i| boxes[*i as usize]).collect();
-        let leaves = order.len().div_ceil(LEAF).next_power_of_two();
-        let mut nodes = vec![empty; 2 * leaves];
-        for (leaf, inside) in boxes.chunks(LEAF).enumerate() {
-            nodes[leaves + leaf] = inside.iter().fold(empty, join);
-        }
-        for node in (1..leaves).rev() {
-            nodes[node] = join(nodes[2 * node], &nodes[2 * node + 1]);
-        }
-        Self { order, boxes, nodes, leaves }
-    }
-
-    /// Adds to `close` the leaves from `first` on whose bounds overlap those of leaf `of`.
-    fn close_to(&self, of: usize, first: usize, stack: &mut Vec<(usize, usize)>, close: &mut Vec<usize>) {
-        let bounds = &self.nodes[self.leaves + of];
-        stack.clear();
-        close.clear();
-        // Node, and one past its last leaf.
-        stack.push((1, self.leaves));
-        while let Some((node, end)) = stack.pop() {
-            if end <= first || !meet(bounds, &self.nodes[node]) {
-                continue;
-            }
-            if node < self.leaves {
-                // The width of a node's span is that of its level.
-                let width = self.leaves >> node.ilog2();
-                stack.push((2 * node + 1, end));
-                stack.push((2 * node, end - width / 2));
-            } else {
-                close.push(end - 1);
-            }
-        }
-    }
-
-    /// The triangles of a leaf, each with its position in the order.
-    fn leaf(&self, leaf: usize) -> impl Iterator<Item = (usize, u32)> {
-        let first = (leaf * LEAF).min(self.order.len());
-        let end = (first + LEAF).min(self.order.len());
-        (first..end).zip(self.order[first..end].iter().copied())
-    }
-}
-
-/// The lower 20 bits, with two zeros between each.
-fn spread(bits: u64) -> u64 {
-    let mut x = bits & 0x1f_ffff;
-    x = (x | x << 32) & 0x001f_0000_0000_ffff;
-    x = (x | x << 16) & 0x001f_0000_ff00_00ff;
-    x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
-    x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
-    (x | x << 2) & 0x1249_2492_4924_9249
 }
 
 /// The intersecting pairs among the triangles with area, up to `limit`; with `marked` only pairs with a marked
@@ -172,7 +78,7 @@ pub(crate) fn crossings(
 
 /// Whether two triangles are certainly apart, except for vertices that they share.
 fn apart(vertices: &[Vec3], a: [u32; 3], b: [u32; 3]) -> bool {
-    let at = |t: [u32; 3]| t.map(|v| vertices[v as usize]);
+    let at = |[a, b, c]: [u32; 3]| [vertices[a as usize], vertices[b as usize], vertices[c as usize]];
     let (pa, pb) = (at(a), at(b));
     let mut shared = (0..3).filter(|&k| b.contains(&a[k]));
     match (shared.next(), shared.next(), shared.next()) {

@@ -3,7 +3,6 @@
 use std::ops::RangeInclusive;
 
 use super::{Opening, Wall, opening, survey};
-use crate::Result;
 
 /// Plausible diagonals of a surface, mm: from a single small artery to a whole body.
 const BELIEVED_MM: RangeInclusive<f64> = 5.0..=3000.0;
@@ -25,13 +24,10 @@ const TIGHT_RADII: f64 = 0.1;
 
 /// Hints for the user on a wall that was read with `unit_mm`, one sentence each: on a possibly wrong unit, on openings
 /// that face each other, and on openings with the vessel right in front.
-///
-/// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the wall cannot be queried.
-pub fn wall_hints(wall: &Wall, unit_mm: f64) -> Result<Vec<String>> {
+pub fn wall_hints(wall: &Wall, unit_mm: f64) -> Vec<String> {
     let (low, high) = wall.mesh().used_bounds_mm().unwrap_or_default();
-    let unit = unit_hint((high - low).norm(), survey::median_half_lumen_mm(wall)?, unit_mm);
-    Ok(unit.into_iter().chain(opening_hints(wall.openings())).collect())
+    let unit = unit_hint((high - low).norm(), survey::median_half_lumen_mm(wall), unit_mm);
+    unit.into_iter().chain(opening_hints(wall.openings())).collect()
 }
 
 /// One sentence for each pair of openings that face each other, and for each opening without room in front of it.

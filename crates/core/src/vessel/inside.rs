@@ -15,7 +15,7 @@ const LARGEST_DEVIATION: f64 = 0.1;
 
 /// Signed solid angle of a triangle seen from the origin, in steradian: positive if its winding is clockwise from
 /// there, as that of an outward triangle is from inside.
-fn solid_angle(corners: [Vec3; 3]) -> f64 {
+pub(super) fn solid_angle(corners: [Vec3; 3]) -> f64 {
     let [a, b, c] = corners;
     let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
     let volume = a.dot(&b.cross(&c));

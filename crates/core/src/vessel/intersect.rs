@@ -88,6 +88,19 @@ pub(crate) fn triangles_intersect(vertices: &[Vec3], a: [u32; 3], b: [u32; 3]) -
     }
 }
 
+/// Where a ray meets a triangle (Möller and Trumbore, 1997).
+pub(super) fn ray_meets(from: &Vec3, way: &Vec3, [a, b, c]: [Vec3; 3]) -> Option<f64> {
+    let (e, f) = (b - a, c - a);
+    let p = way.cross(&f);
+    let inverse = 1.0 / e.dot(&p);
+    let s = from - a;
+    let u = s.dot(&p) * inverse;
+    let q = s.cross(&e);
+    let v = way.dot(&q) * inverse;
+    let distance = f.dot(&q) * inverse;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance >= 0.0).then_some(distance)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

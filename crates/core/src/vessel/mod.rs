@@ -1,6 +1,7 @@
 //! The vessel that devices are pushed into.
 
 pub mod anatomy;
+mod boxes;
 mod centreline;
 mod check;
 mod conditioning;
@@ -25,6 +26,7 @@ pub mod motion;
 mod opening;
 mod orient;
 mod path;
+mod pieces;
 mod point_lists;
 mod query;
 mod recipe;
@@ -47,6 +49,7 @@ pub use centreline::{CentrelineNode, CentrelineTree, Target};
 #[cfg(test)]
 use check::check_with;
 pub use check::{CheckReport, OpeningReport, check, check_repaired};
+pub(crate) use conditioning::LARGEST_DEVIATION_MM;
 pub use conditioning::{Conditioned, Conditioning, condition};
 pub use extract::{CentrelineBranch, CentrelineEnd, ExtractedCentreline};
 pub use files::{PatientAxes, SurfaceFrame};
@@ -61,6 +64,8 @@ pub(crate) use mesh::inward_vertex_normals;
 pub use motion::{Displacement, MotionMode, VesselMotion, Waveform};
 pub use opening::Opening;
 pub use path::{CentrelinePath, OnPath};
+pub use pieces::PieceReport;
+pub(crate) use pieces::Pieces;
 pub use query::{Nearest, WallQuery};
 pub use recipe::{CentrelineRecipe, NoStore, WallRecipe, WallStore};
 pub use repairs::{Repair, RepairKind, RepairMode, RepairOptions};

@@ -11,6 +11,7 @@ use parry3d_f64::partitioning::BvhNode;
 use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};
 use parry3d_f64::shape::{CompositeShapeRef, TriMesh, Triangle, TrianglePointLocation};
 
+use super::mesh::inward_normal;
 use super::topology::{EdgeTable, NONE};
 use super::{SurfaceMesh, Wall, inward_vertex_normals};
 use crate::{Error, Result, Vec3};
@@ -88,6 +89,12 @@ fn from_parry(v: DVec3) -> Vec3 {
     Vec3::new(v.x, v.y, v.z)
 }
 
+/// Distance of a point from a triangle, mm.
+pub(super) fn distance_to_triangle([a, b, c]: &[Vec3; 3], point_mm: &Vec3) -> f64 {
+    let triangle = Triangle::new(to_parry(a), to_parry(b), to_parry(c));
+    triangle.distance_to_local_point(to_parry(point_mm), false)
+}
+
 impl WallQuery {
     /// Queries on `wall`. The first takes O(n log n) time, others O(log n).
     ///
@@ -120,8 +127,7 @@ impl WallQuery {
 
     /// Unit normal of a triangle, into the lumen. `triangle` is an index returned by [`WallQuery::nearest`].
     pub fn inward_normal(&self, triangle: u32) -> Vec3 {
-        let [a, b, c] = self.mesh.corners(triangle as usize);
-        (c - a).cross(&(b - a)).try_normalize(0.0).unwrap_or_else(Vec3::x)
+        inward_normal(&self.mesh, triangle as usize)
     }
 
     /// Corners of a triangle.
@@ -137,8 +143,7 @@ impl WallQuery {
 
     /// Distance of a point from a triangle, mm, on either side.
     pub(crate) fn distance_to(&self, triangle: u32, point_mm: &Vec3) -> f64 {
-        let [a, b, c] = self.corners(triangle).map(|v| to_parry(&v));
-        Triangle::new(a, b, c).distance_to_local_point(to_parry(point_mm), false)
+        distance_to_triangle(&self.corners(triangle), point_mm)
     }
 
     /// Where the straight path from one point to another first meets the wall, as a fraction of the path, up to

@@ -3,8 +3,10 @@
 use std::cell::LazyCell;
 use std::f64::consts::PI;
 
-use super::{Wall, WallQuery};
-use crate::{Result, Vec3};
+use super::boxes::Tree;
+use super::mesh::inward_normal;
+use super::{SurfaceMesh, Wall};
+use crate::Vec3;
 
 /// Largest number of triangles sampled, evenly over the wall.
 const SAMPLES: usize = 20_000;
@@ -75,12 +77,9 @@ pub struct Survey {
 }
 
 /// Measures `wall` by rays from up to 20,000 of its triangles. Septa thinner than `septum_mm` are counted.
-///
-/// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the wall cannot be queried.
-pub fn survey(wall: &Wall, septum_mm: f64) -> Result<Survey> {
+pub fn survey(wall: &Wall, septum_mm: f64) -> Survey {
     let mesh = wall.mesh();
-    let query = WallQuery::new(wall)?;
+    let boxes = all_boxes(mesh);
     let size_mm = mesh.used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
     let off_mm = OFF * size_mm;
     // Computed only if needed, since few walls have septa.
@@ -90,14 +89,14 @@ pub fn survey(wall: &Wall, septum_mm: f64) -> Result<Survey> {
     let mut septa =
         SeptaReport { below_mm: septum_mm, asked: 0, thin: 0, thinnest_mm: None, thinnest_at_mm: None };
     for t in (0..mesh.triangles.len()).step_by(every) {
-        let (at, inward) = (wall.mesh().middle(t), query.inward_normal(t as u32));
+        let (at, inward) = (mesh.middle(t), inward_normal(mesh, t));
         septa.asked += 1;
-        if let Some(half) = half_chord(&query, (at, inward), size_mm) {
+        if let Some(half) = half_chord(&boxes, mesh, (at, inward), size_mm) {
             chords.push((half, at + inward * half));
         }
-        let back = query.first_met(&(at - inward * off_mm), &-inward, septum_mm);
+        let back = boxes.first_met(mesh, &(at - inward * off_mm), &-inward, septum_mm);
         if let Some((mm, other)) = back
-            && query.inward_normal(other).dot(&inward) < BACK_TO_BACK
+            && inward_normal(mesh, other as usize).dot(&inward) < BACK_TO_BACK
             && !within_steps(&neighbours, t as u32, other)
         {
             septa.thin += 1;
@@ -108,7 +107,7 @@ pub fn survey(wall: &Wall, septum_mm: f64) -> Result<Survey> {
         }
     }
     chords.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let start = start(wall, &query, &chords, size_mm);
+    let start = start(wall, &boxes, &chords, size_mm);
     let at = |part: f64| chords[(part * (chords.len() - 1) as f64) as usize].0;
     let lumen = chords.first().map(|(smallest_mm, place)| LumenReport {
         smallest_mm: *smallest_mm,
@@ -118,13 +117,18 @@ pub fn survey(wall: &Wall, septum_mm: f64) -> Result<Survey> {
         median_mm: at(0.5),
         chords: chords.len(),
     });
-    Ok(Survey { lumen, septa, start })
+    Survey { lumen, septa, start }
+}
+
+/// The boxes of all triangles. So few rays are not worth the structures of a query.
+fn all_boxes(mesh: &SurfaceMesh) -> Tree {
+    Tree::new(mesh, (0..mesh.triangles.len() as u32).collect())
 }
 
 /// Half the distance from a position on the wall along its inward normal to the opposite wall, mm.
-fn half_chord(query: &WallQuery, (at, inward): (Vec3, Vec3), size_mm: f64) -> Option<f64> {
+fn half_chord(boxes: &Tree, mesh: &SurfaceMesh, (at, inward): (Vec3, Vec3), size_mm: f64) -> Option<f64> {
     let off_mm = OFF * size_mm;
-    let (mm, _) = query.first_met(&(at + inward * off_mm), &inward, size_mm)?;
+    let (mm, _) = boxes.first_met(mesh, &(at + inward * off_mm), &inward, size_mm)?;
     Some((mm + off_mm) / 2.0)
 }
 
@@ -133,19 +137,16 @@ const FEW_SAMPLES: usize = 1000;
 
 /// Median half chord along inward normals of the wall, mm, as in [`LumenReport`] but from fewer triangles; `None`
 /// without any hit.
-///
-/// # Errors
-/// As [`survey`].
-pub(super) fn median_half_lumen_mm(wall: &Wall) -> Result<Option<f64>> {
+pub(super) fn median_half_lumen_mm(wall: &Wall) -> Option<f64> {
     let mesh = wall.mesh();
-    let query = WallQuery::new(wall)?;
+    let boxes = all_boxes(mesh);
     let size_mm = mesh.used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
     let every = mesh.triangles.len().div_ceil(FEW_SAMPLES).max(1);
     let asked = (0..mesh.triangles.len()).step_by(every);
-    let place = |t: usize| (wall.mesh().middle(t), query.inward_normal(t as u32));
-    let mut chords: Vec<f64> = asked.filter_map(|t| half_chord(&query, place(t), size_mm)).collect();
+    let chord = |t: usize| half_chord(&boxes, mesh, (mesh.middle(t), inward_normal(mesh, t)), size_mm);
+    let mut chords: Vec<f64> = asked.filter_map(chord).collect();
     chords.sort_by(f64::total_cmp);
-    Ok(chords.get(chords.len().saturating_sub(1) / 2).copied())
+    chords.get(chords.len().saturating_sub(1) / 2).copied()
 }
 
 /// Whether one triangle is reached from the other across a few edges.
@@ -167,17 +168,14 @@ fn within_steps(neighbours: &[[u32; 3]], from: u32, to: u32) -> bool {
 }
 
 /// The middle of a chord that is deepest in the lumen, and the direction with the longest free path.
-fn start(wall: &Wall, query: &WallQuery, chords: &[(f64, Vec3)], size_mm: f64) -> Option<StartReport> {
+fn start(wall: &Wall, boxes: &Tree, chords: &[(f64, Vec3)], size_mm: f64) -> Option<StartReport> {
     // Few of the longest, many of the rest: the longest chords may run along the vessel.
-    let count = chords.len();
+    let (mesh, count) = (wall.mesh(), chords.len());
     let step = |k: usize| count - 1 - (count - 1) * k * k / (PLACES * PLACES);
     let mut places: Vec<(f64, Vec3)> = Vec::new();
     for k in 0..PLACES.min(count) {
         let (_, place) = chords[step(k)];
-        let Some(near) = query.nearest(&place, f64::INFINITY) else { continue };
-        if !near.rim && near.distance_mm > 0.0 {
-            places.push((near.distance_mm, place));
-        }
+        places.extend(boxes.distance_mm(mesh, &place).map(|clearance_mm| (clearance_mm, place)));
     }
     // An inside test visits all triangles: the deepest positions are tested first.
     places.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -191,7 +189,7 @@ fn start(wall: &Wall, query: &WallQuery, chords: &[(f64, Vec3)], size_mm: f64) -
         let across = (1.0 - z * z).sqrt();
         let direction = Vec3::new(across * cos, across * sin, z);
         // A path that leaves through an opening counts as the longest.
-        let free = query.first_met(&place, &direction, size_mm).map_or(0.0, |met| met.0);
+        let free = boxes.first_met(mesh, &place, &direction, size_mm).map_or(0.0, |met| met.0);
         if free > longest.0 {
             longest = (free, direction);
         }

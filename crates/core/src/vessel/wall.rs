@@ -622,6 +622,6 @@ fn turn_outward(mesh: &mut SurfaceMesh, edges: &mut Edges, consistency: &orient:
 
 /// Signed volume of the tetrahedron over a triangle in mm³.
 pub(crate) fn signed_volume(corners: &[Vec3; 3], origin: Vec3) -> f64 {
-    let [a, b, c] = corners.map(|v| v - origin);
-    a.dot(&b.cross(&c)) / 6.0
+    let [a, b, c] = corners;
+    (a - origin).dot(&(b - origin).cross(&(c - origin))) / 6.0
 }

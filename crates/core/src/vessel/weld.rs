@@ -5,6 +5,8 @@
 
 use std::collections::VecDeque;
 
+use rustc_hash::FxHashMap;
+
 use super::SurfaceMesh;
 use super::topology::DisjointSets;
 use super::wall::validate;
@@ -55,12 +57,16 @@ impl Welding {
 /// For each vertex the index of the vertex it is merged into (its own index if it stays): the smallest index of all
 /// vertices linked to it by steps of at most `tolerance_mm`. Vertices that are not finite are not merged.
 fn merge_targets(vertices_mm: &[Vec3], tolerance_mm: f64) -> Vec<u32> {
-    let usable = |v: &Vec3| v.iter().all(|c| c.is_finite());
-    let mut order: Vec<(f64, u32)> =
-        (0..).zip(vertices_mm).filter(|(_, v)| usable(v)).map(|(index, v)| (ALONG.dot(v), index)).collect();
+    let first = first_equals(vertices_mm);
+    let is_wanted = |index: u32, v: &Vec3| first[index as usize] == index && v.iter().all(|c| c.is_finite());
+    let mut order: Vec<(f64, u32)> = (0..)
+        .zip(vertices_mm)
+        .filter(|(index, v)| is_wanted(*index, v))
+        .map(|(index, v)| (ALONG.dot(v), index))
+        .collect();
     order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let mut sets = DisjointSets::new(vertices_mm.len());
-    // Distinct vertices that may be close to the next one.
+    // Vertices that may be close to the next one.
     let mut last: VecDeque<(f64, u32, Vec3)> = VecDeque::new();
     for (at, index) in order {
         let v = vertices_mm[index as usize];
@@ -68,22 +74,26 @@ fn merge_targets(vertices_mm: &[Vec3], tolerance_mm: f64) -> Vec<u32> {
         while last.front().is_some_and(|before| !is_near(before)) {
             last.pop_front();
         }
-        let mut is_distinct = true;
-        for (_, other, w) in last.iter().rev() {
+        for (_, other, w) in &last {
             if (v - w).norm() <= tolerance_mm {
                 sets.join(index, *other);
             }
-            // It is close to everything that the other one was close to.
-            is_distinct = v != *w;
-            if !is_distinct {
-                break;
-            }
         }
-        if is_distinct {
-            last.push_back((at, index, v));
-        }
+        last.push_back((at, index, v));
     }
-    (0..vertices_mm.len() as u32).map(|v| sets.find(v)).collect()
+    first.into_iter().map(|v| sets.find(v)).collect()
+}
+
+/// For each vertex the index of the first one that equals it; its own for one that is not finite.
+fn first_equals(vertices_mm: &[Vec3]) -> Vec<u32> {
+    // Only used for lookups, never iterated: its order cannot affect the result.
+    let mut known: FxHashMap<[u64; 3], u32> = FxHashMap::default();
+    let first = |(index, v): (u32, &Vec3)| {
+        // −0 is 0.
+        let key = [v.x + 0.0, v.y + 0.0, v.z + 0.0].map(f64::to_bits);
+        if v.iter().all(|c| c.is_finite()) { *known.entry(key).or_insert(index) } else { index }
+    };
+    (0..).zip(vertices_mm).map(first).collect()
 }
 
 #[cfg(test)]

@@ -150,11 +150,10 @@ fn shapes_friction_and_regions_are_refused_by_name() {
         let error = tube.start(name, wire.clone(), 0.1).err().unwrap();
         assert!(error.to_string().starts_with("vessel.wall.friction = 0.1"), "{error}");
         let patch = WallRegion {
-            centre_mm: [0.0, 0.0, 50.0],
-            radius_mm: 10.0,
-            transition_mm: None,
+            centre_mm: Some([0.0, 0.0, 50.0]),
+            radius_mm: Some(10.0),
             modulus_n_per_mm2: Some(5.0),
-            friction: None,
+            ..WallRegion::default()
         };
         let patched = WallProperties { region: vec![patch], ..WallProperties::default() };
         let error = tube.start_on(patched, name, wire).err().unwrap().to_string();

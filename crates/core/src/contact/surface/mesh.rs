@@ -72,11 +72,11 @@ impl ContactMesh {
         let surface = extended(&*even(wall, properties, store)?, thickest_mm);
         let surface = Wall::welded(&surface)?;
         let smooth = SmoothWall::new(&surface, thickest_mm);
-        let regions = if properties.region.is_empty() { None } else { RegionMap::new(&smooth, properties) };
         let reach_mm = |smooth: &SmoothWall| reach_mm(thickest_mm, smooth.deepest_inset_mm(), tuning);
         let query = WallQuery::new(&surface)?;
         // Otherwise the first step would wait for it.
         query.prepare();
+        let regions = if properties.region.is_empty() { None } else { RegionMap::new(&query, properties) };
         let narrow = Narrow::of(&smooth, thickest_mm);
         let mut surface = Self { reach_mm: reach_mm(&smooth), smooth, query, regions, narrow };
         if let Some(narrow) = &surface.narrow {

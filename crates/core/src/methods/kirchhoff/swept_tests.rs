@@ -63,11 +63,10 @@ fn a_centre_line_is_felt_by_a_mesh_where_the_wall_has_regions_or_the_device_is_t
     assert!(!meshed(0.2, &plain) && !meshed(3.9, &plain) && meshed(4.1, &plain));
     let place_mm = lumen.openings()[0].centre_mm;
     let region = WallRegion {
-        centre_mm: place_mm.into(),
-        radius_mm: 8.0,
-        transition_mm: None,
+        centre_mm: Some(place_mm.into()),
+        radius_mm: Some(8.0),
         modulus_n_per_mm2: Some(10.0),
-        friction: None,
+        ..WallRegion::default()
     };
     assert!(meshed(0.2, &WallProperties { region: vec![region], ..plain }));
 }

@@ -51,12 +51,18 @@ pub(super) struct Bumps {
 
 impl Bumps {
     pub(super) fn new(corners: &Corners) -> Self {
+        Self::of_every(corners, 1)
+    }
+
+    /// Those of every so many vertices.
+    pub(super) fn of_every(corners: &Corners, stride: usize) -> Self {
         let parts = parallel::parts(corners.vertices.len(), |part| {
             let (mut bumps, mut around) = (Self::default(), Around::default());
             for v in part {
                 bumps.starts.push(bumps.columns.len() as u32);
-                let at_rest_mm = bumps.add(corners, v as u32, &mut around).unwrap_or(0.0);
-                bumps.at_rest_mm.push(at_rest_mm);
+                let is_wanted = v.is_multiple_of(stride);
+                let found = is_wanted.then(|| bumps.add(corners, v as u32, &mut around)).flatten();
+                bumps.at_rest_mm.push(found.unwrap_or(0.0));
             }
             bumps
         });

@@ -50,6 +50,9 @@ const ITERATIONS: (usize, usize) = (40, 15);
 /// Number of times edges are shortened where the surfaces are farther apart than the limit.
 const CORRECTIONS: usize = 1;
 
+/// Largest distance by which a wall may be moved, mm: any vessel is gone.
+pub(crate) const LARGEST_DEVIATION_MM: f64 = 10.0;
+
 /// Limits of [`condition`].
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Conditioning {
@@ -72,8 +75,10 @@ impl Conditioning {
     }
 
     fn check(&self) -> Result<()> {
-        if !(self.deviation_mm > 0.0 && self.deviation_mm.is_finite()) {
-            let remedy = "must be positive: how far the wall may be moved, in mm";
+        if !(self.deviation_mm > 0.0 && self.deviation_mm <= LARGEST_DEVIATION_MM) {
+            let remedy = format!(
+                "must be above 0 and at most {LARGEST_DEVIATION_MM}: how far the wall may be moved, mm"
+            );
             return Err(Error::parameter("deviation_mm", self.deviation_mm, remedy));
         }
         if self.most_triangles == 0 {

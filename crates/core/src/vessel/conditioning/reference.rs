@@ -12,6 +12,7 @@ use parry3d_f64::query::Ray;
 use super::corners::vertex_normals;
 use crate::Vec3;
 use crate::vessel::SurfaceMesh;
+use crate::vessel::intersect::ray_meets;
 use crate::vessel::topology::{EdgeTable, NONE};
 
 /// Longest walk, in triangles. On the densest meshes a step of one target edge crosses about a hundred.
@@ -143,7 +144,7 @@ impl<'a> Reference<'a> {
         let hit = |leaf: u32, _: f64| {
             let [a, b, c] = self.mesh.corners(leaf as usize);
             let faces = (b - a).cross(&(c - a)).dot(way) * outward > 0.0;
-            meets(from, way, [a, b, c]).filter(|distance| faces && *distance > skip_mm)
+            ray_meets(from, way, [a, b, c]).filter(|distance| faces && *distance > skip_mm)
         };
         let (triangle, distance) = self.tree.cast_ray(&ray, reach_mm, hit)?;
         let [a, b, c] = self.mesh.corners(triangle as usize);
@@ -191,19 +192,6 @@ pub(super) fn hierarchy(mesh: &SurfaceMesh) -> Bvh {
     };
     let leaves: Vec<Aabb> = (0..mesh.triangles.len()).map(bounds).collect();
     Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves)
-}
-
-/// Where a ray meets a triangle (Möller and Trumbore, 1997).
-fn meets(from: &Vec3, way: &Vec3, [a, b, c]: [Vec3; 3]) -> Option<f64> {
-    let (e, f) = (b - a, c - a);
-    let p = way.cross(&f);
-    let inverse = 1.0 / e.dot(&p);
-    let s = from - a;
-    let u = s.dot(&p) * inverse;
-    let q = s.cross(&e);
-    let v = way.dot(&q) * inverse;
-    let distance = f.dot(&q) * inverse;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance >= 0.0).then_some(distance)
 }
 
 /// Barycentric coordinates of the point of a triangle closest to `x`.

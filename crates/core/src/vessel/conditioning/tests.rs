@@ -177,7 +177,11 @@ fn options_out_of_range_are_named() {
     let mesh = uneven_tube(5);
     let with =
         |deviation_mm: f64| condition(&mesh, &Conditioning { deviation_mm, ..Conditioning::default() });
-    assert!(with(0.0).is_err() && with(f64::NAN).is_err() && with(0.05).is_ok());
+    for value in [0.0, f64::NAN, 10.1, 1e9, f64::INFINITY] {
+        let error = with(value).unwrap_err().to_string();
+        assert!(error.starts_with("deviation_mm = ") && error.contains("at most 10"), "{error}");
+    }
+    assert!(with(0.05).is_ok() && with(10.0).is_ok());
 }
 
 /// A closed box.

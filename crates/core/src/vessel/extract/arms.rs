@@ -82,7 +82,8 @@ pub(super) fn add(lumen: &Lumen<'_>, root: Sphere, wanted: Rings, tree: &mut Gro
         }
     }
     let Some((spheres, ways, classes, rings)) = best else { return Arms::default() };
-    let mut adding = Adding { lumen, tree, spheres: &spheres, classes: &classes, rows: Vec::new() };
+    let mut adding =
+        Adding { lumen, tree, spheres: &spheres, classes: &classes, rows: Vec::new(), ends: Vec::new() };
     let mut arms = Arms::default();
     let most = match wanted {
         Rings::Handles(count) => count,
@@ -91,6 +92,7 @@ pub(super) fn add(lumen: &Lumen<'_>, root: Sphere, wanted: Rings, tree: &mut Gro
     for ring in rings.into_iter().take(most) {
         let [Some(from), Some(to)] = ring.map(|end| ways.to(end)) else { continue };
         let Some((first, link)) = adding.add(&from, &to) else { continue };
+        adding.ends.push(link.row);
         arms.links.push(link);
         let name = format!("arm {}", arms.links.len());
         arms.targets.push(Target { name, row: first + (link.row - first) / 2 });
@@ -107,6 +109,8 @@ struct Adding<'a> {
     /// For each row of the tree the sphere that it is deepest in, and the class of the way to it through the tree
     /// with the cheapest way to that sphere; `None` after a gap between spheres.
     rows: Vec<(usize, Option<Class>)>,
+    /// The last rows of the arms so far.
+    ends: Vec<usize>,
 }
 
 impl Adding<'_> {
@@ -131,7 +135,7 @@ impl Adding<'_> {
         if left < shared {
             let stem = self.of(&from[left..shared]);
             let stem = line::centred(self.lumen, &line::divided(&stem), [false; 2]);
-            stem_end = self.tree.join(Some(entry), &stem);
+            stem_end = self.tree.join(Some(self.open(entry)), &stem);
             self.know_rows();
         }
         let ((mut start, a), (mut end, b)) = (self.leaves(from), self.leaves(to));
@@ -159,12 +163,18 @@ impl Adding<'_> {
             // The stem ends where the ways part: nothing of it may be left over as an end.
             (start, end) = (fork, fork);
         }
-        let row = self.tree.join(Some(start), &arm).filter(|row| *row >= first)?;
+        let row = self.tree.join(Some(self.open(start)), &arm).filter(|row| *row >= first)?;
         // A point that begins and ends at the same row is no arm.
         if self.tree.nodes[row].parent == Some(end) {
             return None;
         }
         Some((first, CentrelineLink { row, joins: end }))
+    }
+
+    /// The row, or the one before it if it is the last of an arm, which it stays.
+    fn open(&self, row: usize) -> usize {
+        let before = self.tree.nodes[row].parent.filter(|_| self.ends.contains(&row));
+        before.unwrap_or(row)
     }
 
     fn of(&self, way: &[usize]) -> Vec<Sphere> {

@@ -230,6 +230,61 @@ fn both_lumina_beside_a_flap_are_in_the_line() {
     assert!(!wall.contains(&Vec3::new(1.0, 0.0, 50.0)).unwrap());
 }
 
+/// A tube of radius 4 mm along z from 0 to 80 mm, of 16 edges around and so many along, with an ellipsoid beside its axis.
+fn calcified(x_mm: f64, half_mm: f64, along: u32) -> SurfaceMesh {
+    const AROUND: u32 = 16;
+    let mut mesh = SurfaceMesh::default();
+    for k in 0..=along * AROUND + AROUND - 1 {
+        let on = on_circle(TAU * f64::from(k % AROUND) / f64::from(AROUND), 4.0);
+        mesh.vertices_mm.push(on + Vec3::z() * (80.0 * f64::from(k / AROUND) / f64::from(along)));
+    }
+    for ring in 0..along {
+        for k in 0..AROUND {
+            let at = |ring: u32, k: u32| ring * AROUND + k % AROUND;
+            let [a, b, c, d] = [at(ring, k), at(ring, k + 1), at(ring + 1, k + 1), at(ring + 1, k)];
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    let golden = (1.0 + 5.0_f64.sqrt()) / 2.0;
+    // An icosahedron, each face in four.
+    let sides = [-1.0, 1.0].into_iter().flat_map(|a| [-golden, golden].map(|b| (a, b)));
+    let corners: Vec<Vec3> =
+        sides.flat_map(|(a, b)| [Vec3::new(a, b, 0.0), Vec3::new(0.0, a, b), Vec3::new(b, 0.0, a)]).collect();
+    let placed =
+        |v: Vec3| v.normalize().component_mul(&Vec3::new(1.8, 1.8, half_mm)) + Vec3::new(x_mm, 0.0, 40.0);
+    let near = |a: usize, b: usize| (corners[a] - corners[b]).norm() < 2.1;
+    for a in 0..12 {
+        for b in a + 1..12 {
+            for c in (b + 1..12).filter(|c| near(a, b) && near(b, *c) && near(a, *c)) {
+                let [p, q, r] = [corners[a], corners[b], corners[c]];
+                let (q, r) = if p.dot(&q.cross(&r)) > 0.0 { (q, r) } else { (r, q) };
+                for face in [[p, p + q, p + r], [q, q + r, p + q], [r, p + r, q + r], [p + q, q + r, p + r]] {
+                    let first = mesh.vertices_mm.len() as u32;
+                    mesh.vertices_mm.extend(face.map(placed));
+                    mesh.triangles.push([first, first + 1, first + 2]);
+                }
+            }
+        }
+    }
+    mesh
+}
+
+#[test]
+fn an_arm_that_begins_where_another_one_ends_leaves_that_end_a_leaf() {
+    for (x_mm, half_mm, along) in [(1.7, 4.2, 36), (1.8, 4.0, 40)] {
+        let wall = Wall::from_surface(&calcified(x_mm, half_mm, along)).unwrap();
+        assert_eq!(wall.report().bodies_in_lumen, 1);
+        let tree = ExtractedCentreline::of(&wall, None, &[]).unwrap().tree;
+        assert!(!tree.links().is_empty());
+        for node in tree.nodes() {
+            assert!(node.radius_mm > 0.3 && node.position_mm.xy().norm() < 3.9, "{node:?}");
+        }
+        let way = tree.path_to(tree.target("opening 1").unwrap().row).unwrap();
+        // Beside the body it bends by two millimetres.
+        assert!((80.0..82.0).contains(&way.length_mm()), "{}", way.length_mm());
+    }
+}
+
 /// Spheres of radius 1 at these places, as a complex.
 fn rings_of(places: &[Vec3], edges: impl Fn(usize, usize) -> bool) -> Vec<[usize; 2]> {
     let mut spheres = Spheres::default();
