@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::gradient_tests::{Numbers, SCENES, parameters, simulation, then_s};
 use super::{Move, Recorded, Simulation};
 use crate::Vec3;
-use crate::methods::{Parameter, Weights};
+use crate::methods::{Gradient, Parameter, Weights};
 
 /// A simulation after some commands, the next ones and their times.
 fn before(scene: usize, seed: u64, commands: usize) -> (Simulation, Vec<Vec<Move>>, Vec<f64>) {
@@ -42,14 +42,16 @@ fn weights(recording: &Recorded, instruments: usize) -> Vec<Weights> {
 }
 
 /// The sum of numbers with their weights.
-fn sum(weights: &[Weights], numbers: &[Weights]) -> f64 {
+fn sum(weights: &[Weights], gradients: &[Gradient]) -> f64 {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let each = weights.iter().zip(numbers).map(|(a, b)| {
+    let each = weights.iter().zip(gradients).map(|(a, b)| {
+        let b = &b.slopes[0];
+        let pushes: Vec<f64> = b.push_force_n.iter().map(|push_n| push_n.unwrap_or(0.0)).collect();
         let places = a.positions_mm.iter().zip(&b.positions_mm).map(|(a, b)| a.dot(b)).sum::<f64>();
         places
             + a.tip_mm.dot(&b.tip_mm)
             + a.energy_mj * b.energy_mj
-            + dot(&a.push_force_n, &b.push_force_n)
+            + dot(&a.push_force_n, &pushes)
             + dot(&a.torque_nmm, &b.torque_nmm)
             + dot(&a.contact_forces_n, &b.contact_forces_n)
     });

@@ -33,7 +33,6 @@ use super::super::workspace::Tools;
 use super::Scene;
 use super::numbers::{Around, Found, Numbers, tail_numbers};
 use super::remembered::{Entered, Scatter};
-use super::singular;
 use crate::contact::PressingSlopes;
 use crate::device::Stack;
 use crate::field::FieldLoad;
@@ -41,7 +40,7 @@ use crate::methods::{Parameter, Surroundings};
 use crate::rod::element::ElementSystem;
 use crate::rod::{Assembly, ElementData, Layout, element_energy, element_gradients, element_system};
 use crate::solve::External;
-use crate::{Result, Vec3};
+use crate::Vec3;
 
 /// Derivatives in one number, at the same end.
 #[derive(Debug, Clone, Default)]
@@ -348,18 +347,15 @@ impl Local<'_> {
     }
 }
 
-/// The column from two sides, of which one may have another mesh.
-///
-/// # Errors
-/// Another mesh on both sides.
-pub(super) fn column(sides: &[(f64, Option<Found>); 2], here: &Found) -> Result<Column> {
+/// The column from two sides, of which one may have another mesh; none where both have.
+pub(super) fn column(sides: &[(f64, Option<Found>); 2], here: &Found) -> Option<Column> {
     let mut one_sided = false;
     let mut by = [0.0; 2];
     for (by, (step, found)) in by.iter_mut().zip(sides) {
         one_sided |= found.as_ref().is_none_or(|found| !found.same_contacts);
         *by = if found.is_some() { *step } else { 0.0 };
     }
-    let whole = if by[1] == by[0] { return Err(singular()) } else { by[1] - by[0] };
+    let whole = if by[1] == by[0] { return None } else { by[1] - by[0] };
     let [less, more] = sides.each_ref().map(|(_, found)| found.as_ref().unwrap_or(here));
     let slope = |less: &[f64], more: &[f64], sign: f64| -> Vec<f64> {
         less.iter().zip(more).map(|(less, more)| sign * (more - less) / whole).collect()
@@ -372,7 +368,7 @@ pub(super) fn column(sides: &[(f64, Option<Found>); 2], here: &Found) -> Result<
             slope(less.as_ref().unwrap_or(&nothing), more.as_ref().unwrap_or(&nothing), 1.0)
         }
     };
-    Ok(Column {
+    Some(Column {
         right: slope(&less.rows, &more.rows, -1.0),
         along,
         numbers: slope(&less.numbers, &more.numbers, 1.0),
