@@ -286,10 +286,10 @@ fn compare(mut now: Simulation, (steps, friction, seed): (usize, f64, u64), comp
     compared.sort();
 }
 
-/// Largest error of nine of ten derivatives, and of all, where nothing rubs; and with friction. Why that is not smaller is open: the
-/// way of Newton's steps, which turns the triads from which spin is measured, is a tenth of it.
+/// Largest error of nine of ten derivatives, and of all, where nothing rubs; and with friction, where the way of Newton's steps turns the
+/// triads from which spin is measured (`held_tests` has them as they are).
 const SMOOTH: [f64; 2] = [2e-6, 2e-5];
-const RUBBED: [f64; 2] = [1e-3, 2e-3];
+const RUBBED: [f64; 2] = [1e-4, 5e-4];
 
 /// Scenes without friction, with it, with two instruments, and in a vessel that moves.
 pub(super) const SCENES: [Scene; 5] = [

@@ -4,9 +4,9 @@ use super::gradient_tests::{Numbers, SCENES, half, parameters, simulation, then_
 use super::{Move, Simulation};
 use crate::methods::{Gradient, Parameter};
 
-/// Largest error, relative to the derivative of tip, push forces, torques and energy together, or to how a hundredth of them changes if the
+/// Largest error of 99 in 100, and of all, relative to the derivative of tip, push force, torques and energy together, or to how a hundredth of them changes if the
 /// parameter doubles.
-const MOST: f64 = 1e-6;
+const MOST: [f64; 2] = [1e-6, 1e-5];
 
 /// Errors, and how far derivatives by other parameters would be off.
 #[derive(Default)]
@@ -19,18 +19,23 @@ struct Compared {
 }
 
 impl Compared {
-    fn told(&mut self) -> String {
+    /// The error that this part of all does not exceed.
+    fn at(&mut self, part: f64) -> f64 {
         self.errors.sort_by(f64::total_cmp);
-        let at = |part: f64| self.errors[(part * (self.errors.len() - 1) as f64) as usize];
+        self.errors[(part * (self.errors.len() - 1) as f64) as usize]
+    }
+
+    fn is_exact(&mut self) -> bool {
+        self.at(0.99) < MOST[0] && self.at(1.0) < MOST[1]
+    }
+
+    fn told(&mut self) -> String {
+        let [half, most, nearly_all, all] = [0.5, 0.9, 0.99, 1.0].map(|part| self.at(part));
+        let Self { errors, left_out, states, .. } = self;
         format!(
-            "{} derivatives in {} states, {} not compared: errors 50 % {:.1e}, 90 % {:.1e}, 99 % {:.1e}, largest {:.1e}",
-            self.errors.len(),
-            self.states,
-            self.left_out,
-            at(0.5),
-            at(0.9),
-            at(0.99),
-            at(1.0)
+            "{} derivatives in {states} states, {left_out} not compared: errors 50 % {half:.1e}, 90 % {most:.1e}, 99 % {nearly_all:.1e}, \
+             largest {all:.1e}",
+            errors.len()
         )
     }
 }
@@ -40,7 +45,16 @@ fn list(one: &Gradient) -> Vec<f64> {
     let one = &one.slopes[0];
     let pushes = one.push_force_n.iter().map(|push_n| push_n.unwrap_or(0.0));
     let forces = pushes.chain(one.torque_nmm.iter().copied());
-    one.tip_mm.iter().copied().chain(forces).chain([one.energy_mj]).collect()
+    compared(one.tip_mm.iter().copied().chain(forces).chain([one.energy_mj]).collect(), one.torque_nmm.len())
+}
+
+/// What is compared of these: push forces of several instruments are differences themselves, with fewer digits.
+fn compared(mut all: Vec<f64>, hands: usize) -> Vec<f64> {
+    all.truncate(3 + 2 * hands + 1);
+    if hands > 1 {
+        all.drain(3..3 + hands);
+    }
+    all
 }
 
 fn size(list: &[f64]) -> f64 {
@@ -48,11 +62,11 @@ fn size(list: &[f64]) -> f64 {
 }
 
 /// Compares the derivatives of one command.
-fn compare(now: &Simulation, (moves, time_s): (&[Move], f64), by: &[Parameter], compared: &mut Compared) {
+fn compare(now: &Simulation, (moves, time_s): (&[Move], f64), by: &[Parameter], all: &mut Compared) {
     let recording = now.record(&[moves.to_vec()], &[time_s]).unwrap();
     let along = now.sheath().direction;
     let mut before: Option<Vec<f64>> = None;
-    compared.states += 1;
+    all.states += 1;
     for parameter in by {
         // What is changed along the sheath is not changed at all.
         if matches!(*parameter, Parameter::EntryDirection { axis } if along[axis].abs() > 0.9) {
@@ -61,12 +75,12 @@ fn compare(now: &Simulation, (moves, time_s): (&[Move], f64), by: &[Parameter], 
         let own = list(&recording.jvp(&[(*parameter, 1.0)]).unwrap()[0]);
         // Two central differences, and what both lead to without their errors of the second order.
         let h = half(*parameter);
-        let led: Result<Vec<Vec<f64>>, _> = [-h, -0.5 * h, 0.5 * h, h]
+        let led: crate::Result<Vec<Vec<f64>>> = [-h, -0.5 * h, 0.5 * h, h]
             .iter()
-            .map(|by| recording.solved((*parameter, *by)).map(|mut all| all.remove(0)))
+            .map(|by| Ok(compared(recording.solved((*parameter, *by))?.remove(0), moves.len())))
             .collect();
         let Ok(led) = led else {
-            compared.left_out += 1;
+            all.left_out += 1;
             continue;
         };
         let differences: Vec<f64> = (0..own.len())
@@ -81,11 +95,11 @@ fn compare(now: &Simulation, (moves, time_s): (&[Move], f64), by: &[Parameter], 
             let off: Vec<f64> = differences.iter().zip(own).map(|(a, b)| a - b).collect();
             size(&off) / whole
         };
-        if off(&own) > MOST {
+        if off(&own) > MOST[0] {
             println!("{parameter:?}: {:.1e} of {whole:.1e}", off(&own));
         }
-        compared.errors.push(off(&own));
-        compared.others.extend(before.replace(own).map(|before| off(&before)));
+        all.errors.push(off(&own));
+        all.others.extend(before.replace(own).map(|before| off(&before)));
     }
 }
 
@@ -111,7 +125,7 @@ fn derivatives_are_those_of_equilibria_at_the_same_contacts() {
         compare_scene(scene, (13, 0), &mut compared);
         let told = compared.told();
         println!("{:?}: {told}", SCENES[scene]);
-        assert!(compared.errors.len() > 20 && compared.errors.iter().all(|off| *off < MOST), "{told}");
+        assert!(compared.errors.len() > 20 && compared.is_exact(), "{told}");
         // Those of the parameter before it are others.
         assert!(compared.others.iter().filter(|off| **off > 0.1).count() > 20, "{:?}", compared.others);
     }
@@ -133,5 +147,5 @@ fn derivatives_at_the_same_contacts_in_two_hundred_states() {
     }
     let told = all.told();
     println!("all: {told}");
-    assert!(all.states >= 200 && all.errors.iter().all(|off| *off < MOST), "{told}");
+    assert!(all.states >= 200 && all.is_exact(), "{told}");
 }

@@ -2,7 +2,9 @@
 
 use super::simulation::{Simulation, surroundings};
 use crate::device::Stack;
-use crate::methods::{Gradient, Move, Parameter, Passed, Pulled, StepReport, Surroundings, Tape, Together, Weights};
+use crate::methods::{
+    Gradient, Move, Parameter, Passed, Pulled, StepReport, Surroundings, Tape, Together, Weights,
+};
 use crate::{Error, Result};
 
 /// What commands from the state of a simulation have led to, recorded to be differentiated ([`Simulation::record`]).
@@ -97,7 +99,9 @@ impl Recorded {
         let simulation = &self.simulation;
         let slopes = self.tape.push(&surroundings!(simulation, simulation.time_s), along)?;
         let each = self.passed().iter().cloned().zip(slopes);
-        Ok(each.map(|(Passed { report, shape, margin }, slopes)| Gradient { report, shape, slopes, margin }).collect())
+        Ok(each
+            .map(|(Passed { report, shape, margin }, slopes)| Gradient { report, shape, slopes, margin })
+            .collect())
     }
 
     /// What each command leads to where a parameter is larger by so much, solved anew at the same contacts and in the same parts.

@@ -104,9 +104,7 @@ use std::sync::Arc;
 
 use crate::contact::{ContactSurface, Counters, Touching};
 use crate::device::line_mm;
-use crate::methods::{
-    Command, DetachedCoil, LateralForce, Move, StepReport, Surroundings, Tape, Timed,
-};
+use crate::methods::{Command, DetachedCoil, LateralForce, Move, StepReport, Surroundings, Tape, Timed};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;

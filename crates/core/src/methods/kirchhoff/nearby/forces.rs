@@ -14,7 +14,6 @@ use crate::Vec3;
 use crate::methods::Sheath;
 use crate::rod::{ElementData, Frame, Layout, RodState};
 
-
 /// Largest rotation, rad, in the differences along an unknown; as [`super::STEP`].
 const TURN_RAD: f64 = 3e-6;
 /// A sheath so much elsewhere, mm and rad, is where it was.

@@ -58,7 +58,11 @@ impl<const C: usize> Record<C> {
                         }
                         if piece.is_last {
                             let cut = columns.iter().any(|(column, _)| column.one_sided);
-                            slopes.push(slope((&went.numbers, &linear.numbers), (piece, passed), (*step, cut)));
+                            slopes.push(slope(
+                                (&went.numbers, &linear.numbers),
+                                (piece, passed),
+                                (*step, cut),
+                            ));
                         }
                     }
                     if piece.is_last {

@@ -19,8 +19,8 @@ use super::remembered::{Between, Scatter, twisting};
 use super::sparse::Sparse;
 use crate::Vec3;
 use crate::contact::PressingSlopes;
-use crate::rod::quadrature::Point;
 use crate::rod::Layout;
+use crate::rod::quadrature::Point;
 
 impl Between<'_> {
     /// Of the forces beyond those in Newton's matrix: of friction and of the wall that follow from the place of a point, and of friction
@@ -53,11 +53,7 @@ impl Between<'_> {
 }
 
 /// Adds what the moments of friction on the wall do where tangents move.
-pub(super) fn add_moments<const C: usize>(
-    mesh: &Mesh,
-    pressing: &[PressingSlopes],
-    lagging: &mut Sparse,
-) {
+pub(super) fn add_moments<const C: usize>(mesh: &Mesh, pressing: &[PressingSlopes], lagging: &mut Sparse) {
     let l = Layout::<C>;
     if Layout::<C>::ANGLES == 0 {
         return;

@@ -26,14 +26,14 @@
 use super::super::configuration::{Configuration, Start};
 use super::super::search::{Lagged, Search};
 use super::super::workspace::Tools;
+use super::chain::{Chain, Memory, WRENCH};
 use super::columns::{Beside, Column, Local, column};
 use super::forces::{lagging_everywhere, rows, spins};
+use super::lagging::add_moments;
 use super::numbers::{Around, Found, Numbers, Push, Wanted};
 use super::recorded::Piece;
-use super::reverse::motion;
-use super::chain::{Chain, Memory, WRENCH};
-use super::lagging::add_moments;
 use super::remembered::{Between, Entered};
+use super::reverse::motion;
 use super::sparse::{Row, Sparse};
 use super::{Acting, End, Scene, singular};
 use crate::Result;
@@ -174,15 +174,17 @@ impl<const C: usize> Linear<C> {
         } else if reads_mouth {
             linear.read_forces(tools, &around, (&nominal, on), &at, next);
         }
-        let own = linear.local_columns(tools, (&around, next), (&at, &entered), (wanted, scenes));
+        let (own, turned) = linear.local_columns(tools, (&around, next), (&at, &entered), (wanted, scenes));
         if piece.is_last && wanted.energy {
             linear.read_energy(tools, &around, (&nominal, on), next);
         }
         let stick_mm = tools.friction.stick_mm();
         if wanted.hands {
-            for instrument in 0..piece.hands.len() {
-                let mut motions = [None, None, None];
-                for (motion, columns) in motions.iter_mut().enumerate() {
+            for (instrument, mut turned) in turned.into_iter().enumerate() {
+                let mut motions = [None, turned.take(), None];
+                for (motion, columns) in
+                    motions.iter_mut().enumerate().filter(|(_, columns)| columns.is_none())
+                {
                     let to = (instrument, motion, stick_mm);
                     *columns = linear.hand(tools, &around, (&nominal, &here), to, next)?;
                 }
@@ -192,7 +194,10 @@ impl<const C: usize> Linear<C> {
         for (beside, own) in scenes.iter().zip(own) {
             let mut by_sides = || {
                 let sides = beside.sides.each_ref();
-                let found = sides.map(|(by, scene)| (*by, around.found::<C>(tools, scene, on, next)));
+                let found = sides.map(|(by, scene)| {
+                    let start = piece.start_in(scene);
+                    (*by, around.found::<C>(tools, scene, (start.start(), &piece.hands), next))
+                });
                 column(&found, &here)
             };
             let column = own.or_else(&mut by_sides).ok_or_else(singular)?;
@@ -201,14 +206,14 @@ impl<const C: usize> Linear<C> {
         Ok(linear)
     }
 
-    /// Columns of parameters by what they change themselves; none where that is not known.
+    /// Columns of parameters, and of the rotation of each hand, by what they change themselves; none where that is not known.
     fn local_columns(
         &self,
         tools: &mut Tools<C>,
         (around, next): (&Around<'_>, &Configuration),
         (at, entered): (&AtEnd<C>, &[(usize, Vec<Entered>)]),
         (wanted, scenes): (Wanted, &[Beside]),
-    ) -> Vec<Option<Column>> {
+    ) -> (Vec<Option<Column>>, Vec<Option<[Column; 2]>>) {
         let local = Local {
             around,
             at: next,
@@ -217,11 +222,20 @@ impl<const C: usize> Linear<C> {
             numbers: &self.numbers,
             reads: [wanted.energy, wanted.push != Push::Unread],
         };
-        let mut column = |beside: &Beside| {
-            let found = if at.lags { None } else { local.column(tools, beside) };
+        let hands = if wanted.hands { around.piece.hands.len() } else { 0 };
+        if at.lags {
+            return (vec![None; scenes.len()], vec![None; hands]);
+        }
+        let columns = scenes.iter().map(|beside| {
+            let found = local.column(tools, beside);
             found.map(|column| self.balanced(column))
-        };
-        scenes.iter().map(&mut column).collect()
+        });
+        let columns = columns.collect();
+        let turned = (0..hands).map(|instrument| {
+            let found = local.turned(tools, instrument);
+            found.map(|columns| columns.map(|column| self.balanced(column)))
+        });
+        (columns, turned.collect())
     }
 
     /// A column whose forces on what the mouth holds have become part of what is read there.
@@ -326,7 +340,8 @@ impl<const C: usize> Linear<C> {
                     columns.extend(own.zip(shares).map(|(column, share)| (column, weight * share)));
                 }
                 None => {
-                    let own = scenes.iter().zip(&self.scene).filter(|(beside, _)| beside.parameter == *parameter);
+                    let own =
+                        scenes.iter().zip(&self.scene).filter(|(beside, _)| beside.parameter == *parameter);
                     columns.extend(own.map(|(_, column)| (column, *weight)));
                 }
             }

@@ -52,6 +52,7 @@ mod reverse;
 #[cfg(test)]
 mod solved;
 mod sparse;
+mod turned;
 
 use super::Environment;
 use super::carried::{Passage, taken_along};

@@ -4,13 +4,13 @@ use super::super::configuration::{Configuration, Start};
 use super::super::hands::Hand;
 use super::super::tail::TWIST;
 use super::super::workspace::Tools;
+use super::chain::WRENCH;
 use super::forces::{go, longest_mm};
 use super::linear::{AtEnd, Linear, Went};
 use super::numbers::{Around, mouth_of_one, tail_numbers};
-use super::chain::WRENCH;
+use super::recorded::Piece;
 use super::remembered::TAIL_STEP;
 use super::sparse::Row;
-use super::recorded::Piece;
 use super::{End, STICKING, Scene};
 use crate::Result;
 use crate::contact::PressingSlopes;
@@ -248,7 +248,8 @@ impl<const C: usize> Linear<C> {
         let nominal = Scene::new(&environment.surroundings, &Vec::new(), 0.0)?;
         let end = End { state: piece.end(), spins: self.spins.clone() };
         let touches = self.numbers.touches.clone();
-        let around = Around { environment: piece.environment(&environment), piece, end, reads: true, touches };
+        let around =
+            Around { environment: piece.environment(&environment), piece, end, reads: true, touches };
         let Went { way, forces, .. } = &*went;
         let longest_mm = longest_mm::<C>(way);
         let far = forces.iter().fold(longest_mm, |most, force| most.max(force.abs()));

@@ -17,7 +17,8 @@ use super::recorded::{Piece, Recorder};
 use super::{STEP, Scene, scale};
 use crate::contact::ContactSurface;
 use crate::methods::{
-    Command, Margin, Move, Parameter, Passed, Pulled, Slope, StepReport, Surroundings, Tape, Timed, Together, Weights,
+    Command, Margin, Move, Parameter, Passed, Pulled, Slope, StepReport, Surroundings, Tape, Timed, Together,
+    Weights,
 };
 use crate::shape::Shape;
 use crate::{Error, Result};
@@ -152,7 +153,8 @@ impl Recorded {
         environment: &Environment<'_>,
         report: Option<&mut StepReport>,
     ) -> Result<Vec<Piece>> {
-        let mut recorder = Recorder::new(self.way.clone());
+        let way = self.way.clone();
+        let mut recorder = if self.is_first { Recorder::new(way) } else { Recorder::after_others(way) };
         let on = (&self.moves[..], usize::MAX);
         let Driven::Moved(took) =
             workspace.carry_out_recorded(environment, &self.from.state, on, Some(&mut recorder))?

@@ -54,11 +54,12 @@ impl<const C: usize> Record<C> {
                     let mut way = vec![0.0; linear.after.rows];
                     for round in 0..=ROUNDS {
                         piece.with(&environment, &scene, (at.start(), &hands), |acting, own| {
-                            let found = tools.beside(acting, &around.end, &mut next, |search, lagged, triads| {
-                                go(search, &search.state.clone(), (&way, 1.0), triads);
-                                search.assemble(lagged, false);
-                                rows(search)
-                            });
+                            let found =
+                                tools.beside(acting, &around.end, &mut next, |search, lagged, triads| {
+                                    go(search, &search.state.clone(), (&way, 1.0), triads);
+                                    search.assemble(lagged, false);
+                                    rows(search)
+                                });
                             let Some((found, _)) = found else { return Err(singular()) };
                             if round < ROUNDS {
                                 let right: Vec<f64> = found.iter().map(|force| -force).collect();
