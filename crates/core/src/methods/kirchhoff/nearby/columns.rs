@@ -24,7 +24,6 @@
 //! Other parameters have the difference of all forces between two scenes; so have these where forces between instruments or of blood follow the
 //! whole line, and all but sections where push forces of several instruments are read.
 
-use super::super::Environment;
 use super::super::configuration::Configuration;
 use super::super::hands::steered;
 use super::super::material::element;

@@ -194,10 +194,7 @@ impl<const C: usize> Linear<C> {
         for (beside, own) in scenes.iter().zip(own) {
             let mut by_sides = || {
                 let sides = beside.sides.each_ref();
-                let found = sides.map(|(by, scene)| {
-                    let start = piece.start_in(scene);
-                    (*by, around.found::<C>(tools, scene, (start.start(), &piece.hands), next))
-                });
+                let found = sides.map(|(by, scene)| (*by, around.found::<C>(tools, scene, on, next)));
                 column(&found, &here)
             };
             let column = own.or_else(&mut by_sides).ok_or_else(singular)?;

@@ -1,6 +1,5 @@
 //! Parts of commands as they were carried out, to be linearised later.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::super::carried::Passage;
@@ -12,7 +11,6 @@ use super::super::substep::{Attempt, Part};
 use super::{Acting, Scene, check_smooth, progress, resumed};
 use crate::Result;
 use crate::methods::kirchhoff::Environment;
-use crate::rod::Frame;
 use crate::vessel::Displacement;
 
 /// A part of a command.
@@ -22,8 +20,6 @@ pub(super) struct Piece {
     /// How far the hands have come in the command at its start and end, 0 to 1.
     pub(super) shares: [f64; 2],
     pub(super) is_last: bool,
-    /// Whether its start is an end of these commands, in the same sheath.
-    comes_along: bool,
     /// Its end.
     end: UnderWay,
     to: f64,
@@ -36,21 +32,6 @@ impl Piece {
     /// The state at its end.
     pub(super) fn end(&self) -> &KirchhoffState {
         &self.end.state
-    }
-
-    /// Its start where the sheath is that of a scene: what comes along lies there with the triad of that mouth.
-    pub(super) fn start_in(&self, scene: &Scene) -> Cow<'_, Configuration> {
-        let (frame, rod) = (scene.parts.sheath.frame(), &self.was.state.rod);
-        let carried = rod.frames[0].transported_to(&frame.t);
-        let spun = libm::atan2(carried.v.dot(&frame.u), carried.u.dot(&frame.u));
-        if !self.comes_along || spun == 0.0 {
-            return Cow::Borrowed(&self.was);
-        }
-        let mut there = self.was.clone();
-        let rod = &mut there.parts().1.rod;
-        let triads: Vec<Frame> = rod.frames.iter().map(|triad| triad.turned(spun)).collect();
-        rod.measure_from(&triads);
-        Cow::Owned(there)
     }
 
     /// The environment at its end, in that of its command.
@@ -79,20 +60,13 @@ pub(in super::super) struct Recorder {
     /// Hands at its start and at its end.
     way: [Vec<Hand>; 2],
     come: f64,
-    /// Whether its first part comes along from commands before.
-    comes_along: bool,
     pub(super) pieces: Vec<Piece>,
 }
 
 impl Recorder {
-    /// Of the first command, between these hands.
+    /// Of a command between these hands.
     pub(super) fn new(way: [Vec<Hand>; 2]) -> Self {
-        Self { way, come: 0.0, comes_along: false, pieces: Vec::new() }
-    }
-
-    /// Of a command after others.
-    pub(super) fn after_others(way: [Vec<Hand>; 2]) -> Self {
-        Self { comes_along: true, ..Self::new(way) }
+        Self { way, come: 0.0, pieces: Vec::new() }
     }
 
     /// Records an accepted part from `was`, to `end`, with the passage of a moving vessel; `target` is where the hands of the command go.
@@ -114,7 +88,6 @@ impl Recorder {
             hands: hands.to_vec(),
             shares: [std::mem::replace(&mut self.come, come), come],
             is_last: hands == target && part.to == 1.0,
-            comes_along: self.comes_along || !self.pieces.is_empty(),
             end: resumed(&part, end),
             to: part.to,
             holds_still: part.holds_still,

@@ -153,8 +153,7 @@ impl Recorded {
         environment: &Environment<'_>,
         report: Option<&mut StepReport>,
     ) -> Result<Vec<Piece>> {
-        let way = self.way.clone();
-        let mut recorder = if self.is_first { Recorder::new(way) } else { Recorder::after_others(way) };
+        let mut recorder = Recorder::new(self.way.clone());
         let on = (&self.moves[..], usize::MAX);
         let Driven::Moved(took) =
             workspace.carry_out_recorded(environment, &self.from.state, on, Some(&mut recorder))?
