@@ -121,7 +121,7 @@ impl Recorded {
     /// Raises InputError for parameters that do not exist.
     #[pyo3(signature = (*, by))]
     fn gradients(&self, py: Python<'_>, by: List<String>) -> PyResult<Vec<Gradient>> {
-        let found = py.detach(|| {
+        let found: endowire_core::Result<Vec<Gradient>> = py.detach(|| {
             let inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
             let (by, words) = parameters(&by.0, inner.stack())?;
             let all = inner.gradients(&by)?.into_iter();
