@@ -106,7 +106,7 @@ def nested_tubes():
         section = {"bending_stiffness_nmm2": nmm2, "torsional_stiffness_nmm2": nmm2 / 1.3}
         section |= {"radius_mm": 0.5 + 0.4 * k, "inner_radius_mm": 0.3 + 0.4 * k}
         curved = section | {"length_mm": curved_mm, "rest_curvature_per_mm": [per_mm, 0.0]}
-        return endowire.Instrument([curved, section | {"length_mm": straight_mm + 400.0}])
+        return endowire.Instrument([curved, section | {"length_mm": straight_mm + 400.0 * (3 - k)}])
 
     count, z_mm = 24, np.arange(-20.0, 381.0, 40.0)
     angles = 2 * np.pi * np.arange(count) / count

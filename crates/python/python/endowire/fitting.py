@@ -30,6 +30,8 @@ PROMISED = 1e-2
 #: A direction in which the data say less than this fraction of what they say in the clearest one, each parameter in units of its own
 #: value, is not shown by them.
 SHOWN = 1e-6
+#: A value so small is nought but for rounding, and no unit.
+ROUNDED = 1e-12
 ENERGIES = ("bend", "twist", "wall", "field", "tail", "vessel")
 
 
@@ -212,7 +214,7 @@ def fit(
     residual, jacobian = slopes(recorded)
     converged, iterations = False, 0
     # In units of the values themselves numbers of all kinds compare.
-    units = np.where(values != 0.0, np.abs(values), 1.0)
+    units = np.where(np.abs(values) > ROUNDED, np.abs(values), 1.0)
     while not converged and iterations < most_iterations:
         iterations += 1
         normal = jacobian.T @ jacobian + np.diag(weights)
