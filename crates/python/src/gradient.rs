@@ -29,7 +29,7 @@ impl Gradient {
                 |slope| slope.push_force_n.iter().map(|push_n| push_n.unwrap_or(f64::NAN)).collect()
             }
             "torque" => |slope| slope.torque_nmm.clone(),
-            "energy" => |slope| vec![slope.energy.total()],
+            "energy" => |slope| vec![slope.energy_mj],
             "wall_force" => |slope| slope.contact_forces_n.clone(),
             "tip" | "shape" => {
                 let rows = self.gradient.slopes.iter().map(|slope| match of {

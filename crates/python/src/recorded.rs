@@ -3,6 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use endowire_core::Vec3;
+use endowire_core::device::Stack;
 use endowire_core::insertion;
 use endowire_core::methods::{self, Parameter, Weights};
 use numpy::{PyArray1, PyArray2, PyArray3};
@@ -11,6 +12,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays::{List, Numbers, array, points};
 use crate::error::{exception, refuse};
+use crate::gradient::Gradient;
 use crate::report::StepReport;
 
 /// What commands from the state of a simulation led to (`Simulation.recorded`), to be differentiated backwards: a weighted sum of it by any
@@ -42,6 +44,17 @@ impl Recorded {
         found
             .ok_or_else(|| refuse("k", k.to_string(), &format!("there are {count} commands, the first is 0")))
     }
+}
+
+/// Parameters that words stand for, and a word for each.
+pub(crate) fn parameters(
+    words: &[String],
+    stack: &Stack,
+) -> endowire_core::Result<(Vec<Parameter>, Vec<String>)> {
+    let each = words.iter().map(|word| Parameter::named(word, stack));
+    let by: Vec<Parameter> = each.collect::<endowire_core::Result<Vec<_>>>()?.into_iter().flatten().collect();
+    let words = by.iter().map(|parameter| parameter.name(stack)).collect();
+    Ok((by, words))
 }
 
 /// Weights of what a command led to, from a dictionary of kinds.
@@ -103,6 +116,20 @@ impl Recorded {
         points(py, self.passed(k)?.shape.positions_mm.iter().copied())
     }
 
+    /// Derivatives of what each command led to in parameters, words as in `Simulation.gradient`: as `Simulation.gradients`, a Gradient for each.
+    ///
+    /// Raises InputError for parameters that do not exist.
+    #[pyo3(signature = (*, by))]
+    fn gradients(&self, py: Python<'_>, by: List<String>) -> PyResult<Vec<Gradient>> {
+        let found: endowire_core::Result<Vec<Gradient>> = py.detach(|| {
+            let inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+            let (by, words) = parameters(&by.0, inner.stack())?;
+            let all = inner.gradients(&by)?.into_iter();
+            Ok(all.map(|gradient| Gradient { gradient, by: words.clone() }).collect())
+        });
+        found.map_err(exception)
+    }
+
     /// Derivatives of a sum of what the commands led to. `weights` are those of its numbers: a dictionary for each command from the first on,
     /// of kinds as in `Gradient.of` and a weight for each number of that kind, {"tip": [1.0, 0.0, 0.0], "push_force": [0.5]}. `by` are
     /// words for parameters, as in `Simulation.gradient`. Returns a Pulled.
@@ -125,11 +152,7 @@ impl Recorded {
         let words = by.map_or_else(Vec::new, |by| by.0);
         let found: endowire_core::Result<Pulled> = py.detach(|| {
             let inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-            let stack = inner.stack();
-            let each = words.iter().map(|word| Parameter::named(word, stack));
-            let by: Vec<Parameter> =
-                each.collect::<endowire_core::Result<Vec<_>>>()?.into_iter().flatten().collect();
-            let words = by.iter().map(|parameter| parameter.name(stack)).collect();
+            let (by, words) = parameters(&words, inner.stack())?;
             Ok(Pulled { inner: inner.vjp(&weights, &by)?, by: words })
         });
         found.map_err(exception)

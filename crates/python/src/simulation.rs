@@ -20,7 +20,7 @@ use crate::error::{exception, refuse};
 use crate::gradient::Gradient;
 use crate::instrument::Instrument;
 use crate::moves::{of_each, together};
-use crate::recorded::Recorded;
+use crate::recorded::{Recorded, parameters};
 use crate::report::StepReport;
 use crate::start::{self, Arguments, Start};
 use crate::state::{State, fields_of};
@@ -141,10 +141,7 @@ impl Simulation {
         by: &[String],
     ) -> PyResult<Vec<Gradient>> {
         let found = self.with(py, |simulation| {
-            let stack = simulation.stack();
-            let each = by.iter().map(|word| Parameter::named(word, stack));
-            let by: Vec<Parameter> = each.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
-            let words: Vec<String> = by.iter().map(|parameter| parameter.name(stack)).collect();
+            let (by, words) = parameters(by, simulation.stack())?;
             let all = match &times_s {
                 Some(times_s) => simulation.gradients_until(commands, times_s, &by)?,
                 None => simulation.gradients(commands, &by)?,

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::builder::check_entry;
 use super::simulation::{Environment, Simulation, surroundings};
-use crate::methods::{Gradient, Move, Parameter, Parts, StepReport, Surroundings, Timed, Together};
+use crate::methods::{Gradient, Move, Parameter, Parts, Surroundings, Timed};
 use crate::vessel::Lumen;
 use crate::{Error, Result};
 
@@ -38,8 +38,10 @@ impl Simulation {
         by: &[Parameter],
     ) -> Result<Vec<Gradient>> {
         Parameter::check_each_once(by)?;
-        let each: Vec<_> = by.iter().map(|parameter| vec![(*parameter, 1.0)]).collect();
-        self.derivatives((commands, times_s), &each)
+        match commands {
+            [] => self.check_times((commands, times_s)).map(|()| Vec::new()),
+            _ => self.record(commands, times_s)?.gradients(by),
+        }
     }
 
     /// Derivatives of what commands would lead to, along one change of parameters together, each so much: the product J dp, of
@@ -53,17 +55,10 @@ impl Simulation {
         times_s: &[f64],
         along: &[(Parameter, f64)],
     ) -> Result<Vec<Gradient>> {
-        self.derivatives((commands, times_s), &[along.to_vec()])
-    }
-
-    /// Derivatives of what commands would lead to until these times.
-    fn derivatives(&self, (commands, times_s): Timed<'_>, by: &[Together]) -> Result<Vec<Gradient>> {
-        self.check_times((commands, times_s))?;
-        for together in by {
-            Parameter::check_each_once(together.iter().map(|(parameter, _)| parameter))?;
+        match commands {
+            [] => self.check_times((commands, times_s)).map(|()| Vec::new()),
+            _ => self.record(commands, times_s)?.jvp(along),
         }
-        let checked = |report: &StepReport, moves: &[Move]| self.check_moves_after(report, moves);
-        self.method.gradients(&surroundings!(self, self.time_s), (commands, times_s), by, &checked)
     }
 
     /// Checks the times after commands.

@@ -8,7 +8,7 @@ use crate::Vec3;
 use crate::device::{Device, Instrument, Section, Stack};
 use crate::field::{Field, Magnet, Weight};
 use crate::methods::kirchhoff::KirchhoffOptions;
-use crate::methods::{Gradient, Parameter, Weights};
+use crate::methods::{Gradient, Parameter};
 use crate::random::{splitmix64, unit};
 use crate::vessel::motion::{Around, MotionMode, VesselMotion, Waveform};
 use crate::vessel::{Lumen, Resolution, SweptVessel, anatomy};
@@ -117,7 +117,7 @@ fn led_to(simulation: &Simulation, moves: &[Move], parameter: Parameter, by: f64
     values.extend(
         report.instruments.iter().flat_map(|hand| [hand.push_force_n.unwrap_or(0.0), hand.torque_nmm]),
     );
-    values.extend([report.energy.bend, report.energy.twist, report.energy.wall]);
+    values.extend([report.energy.total()]);
     (values, vec![report.contacts.len(), report.substeps as usize])
 }
 
@@ -127,7 +127,7 @@ fn slopes(gradient: &Gradient, k: usize) -> Vec<f64> {
     let mut values: Vec<f64> = slope.tip_mm.iter().copied().collect();
     let forces = slope.push_force_n.iter().zip(&slope.torque_nmm);
     values.extend(forces.flat_map(|(push_n, torque_nmm)| [push_n.unwrap_or(0.0), *torque_nmm]));
-    values.extend([slope.energy.bend, slope.energy.twist, slope.energy.wall]);
+    values.extend([slope.energy_mj]);
     values
 }
 
@@ -157,7 +157,7 @@ pub(super) fn parameters(instruments: usize, friction: f64) -> Vec<Parameter> {
 }
 
 /// Half of the difference that is taken of whole commands.
-fn half(parameter: Parameter) -> f64 {
+pub(super) fn half(parameter: Parameter) -> f64 {
     match parameter {
         Parameter::RestCurvature { .. } => 5e-7,
         Parameter::BendingStiffness { .. } => 1e-3,
@@ -178,8 +178,6 @@ pub(super) struct Numbers(pub(super) u64);
 struct Compared {
     /// Ascending.
     errors: Vec<f64>,
-    /// The same of the linearised parts of recorded commands, of places and forces.
-    recorded: Vec<f64>,
     /// Those that were not compared, since contacts or parts of whole commands change within the difference.
     others: usize,
     states: usize,
@@ -195,14 +193,8 @@ impl Compared {
         self.errors[(part * (self.errors.len() - 1) as f64) as usize]
     }
 
-    /// The same of recorded commands.
-    fn recorded_at(&self, part: f64) -> f64 {
-        self.recorded[(part * (self.recorded.len() - 1) as f64) as usize]
-    }
-
     fn sort(&mut self) {
         self.errors.sort_by(f64::total_cmp);
-        self.recorded.sort_by(f64::total_cmp);
     }
 }
 
@@ -214,11 +206,7 @@ impl std::fmt::Display for Compared {
         write!(
             f,
             "{count} derivatives in {states} states, {others} not compared: errors 50 % {half:.1e}, 90 % {most:.1e}, 99 % \
-             {nearly_all:.1e}, largest {all:.1e}; a derivative costs {cost:.2} steps; recorded: {:.1e}, {:.1e}, {:.1e}, {:.1e}",
-            self.recorded_at(0.5),
-            self.recorded_at(0.9),
-            self.recorded_at(0.99),
-            self.recorded_at(1.0)
+             {nearly_all:.1e}, largest {all:.1e}; a derivative costs {cost:.2} steps"
         )
     }
 }
@@ -271,7 +259,6 @@ fn compare(mut now: Simulation, (steps, friction, seed): (usize, f64, u64), comp
             compared.steps_s += began.elapsed().as_secs_f64();
             (compared.count, compared.states) = (compared.count + by.len(), compared.states + 1);
             let counts = [gradient.report.contacts.len(), gradient.report.substeps as usize];
-            let recording = now.record(std::slice::from_ref(&moves), &[time_s]).unwrap();
             for (k, parameter) in by.iter().enumerate() {
                 let h = half(*parameter);
                 // Two central differences, and what both lead to without their errors of the second order.
@@ -291,20 +278,6 @@ fn compare(mut now: Simulation, (steps, friction, seed): (usize, f64, u64), comp
                 let whole = size(&mut differences.clone());
                 let off = size(&mut differences.clone().zip(slopes(&gradient, k)).map(|(a, b)| a - b));
                 compared.errors.push(off / whole.max(1e-2));
-                let Weights { tip_mm, push_force_n, torque_nmm, .. } =
-                    recording.jvp(&[(*parameter, 1.0)]).unwrap().remove(0);
-                let forces = push_force_n.iter().zip(&torque_nmm).flat_map(|(push, torque)| [*push, *torque]);
-                let own = tip_mm.iter().copied().chain(forces);
-                let whole = size(&mut differences.clone().take(3 + 2 * hands));
-                let off = size(&mut differences.zip(own).map(|(a, b)| a - b));
-                if off > 1e-4 * whole.max(1e-2) {
-                    println!(
-                        "{parameter:?} after {k}: off by {:.1e}, from sides {:.1e}",
-                        off / whole.max(1e-2),
-                        compared.errors[compared.errors.len() - 1]
-                    );
-                }
-                compared.recorded.push(off / whole.max(1e-2));
             }
         }
         let time_s = then_s(&now);
@@ -313,10 +286,10 @@ fn compare(mut now: Simulation, (steps, friction, seed): (usize, f64, u64), comp
     compared.sort();
 }
 
-/// Largest error of nine of ten derivatives, and of all, where nothing rubs; and with friction. Why that is not smaller is open: the
-/// way of Newton's steps, which turns the triads from which spin is measured, is a tenth of it.
+/// Largest error of nine of ten derivatives, and of all, where nothing rubs; and with friction, where the way of Newton's steps turns the
+/// triads from which spin is measured (`held_tests` has them as they are).
 const SMOOTH: [f64; 2] = [2e-6, 2e-5];
-const RUBBED: [f64; 2] = [1e-3, 2e-3];
+const RUBBED: [f64; 2] = [1e-4, 5e-4];
 
 /// Scenes without friction, with it, with two instruments, and in a vessel that moves.
 pub(super) const SCENES: [Scene; 5] = [
@@ -351,7 +324,6 @@ fn gradients_in_two_hundred_states() {
         }
         println!("{scene:?}: {compared}");
         all.errors.extend(&compared.errors);
-        all.recorded.extend(&compared.recorded);
         (all.others, all.states) = (all.others + compared.others, all.states + compared.states);
         (all.gradients_s, all.steps_s) =
             (all.gradients_s + compared.gradients_s, all.steps_s + compared.steps_s);

@@ -5,6 +5,8 @@ mod builder;
 mod changed;
 #[cfg(test)]
 mod gradient_tests;
+#[cfg(test)]
+mod held_tests;
 mod mark;
 mod nodes;
 mod packing;

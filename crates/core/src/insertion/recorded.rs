@@ -2,7 +2,9 @@
 
 use super::simulation::{Simulation, surroundings};
 use crate::device::Stack;
-use crate::methods::{Move, Parameter, Passed, Pulled, StepReport, Surroundings, Tape, Weights};
+use crate::methods::{
+    Gradient, Move, Parameter, Passed, Pulled, StepReport, Surroundings, Tape, Together, Weights,
+};
 use crate::{Error, Result};
 
 /// What commands from the state of a simulation have led to, recorded to be differentiated ([`Simulation::record`]).
@@ -73,13 +75,39 @@ impl Recorded {
         self.tape.pull(&surroundings!(simulation, simulation.time_s), weights, (by, hands))
     }
 
-    /// Changes of what each command leads to for small changes of parameters, each so much: the product J dp, in the order of weights.
+    /// Derivatives of what each command led to, by these parameters: as [`Simulation::gradients_until`].
     ///
     /// # Errors
-    /// As [`Recorded::vjp`].
-    pub fn jvp(&self, along: &[(Parameter, f64)]) -> Result<Vec<Weights>> {
+    /// A parameter that does not exist or occurs twice, a singular equilibrium ([`Error::Computation`]).
+    pub fn gradients(&self, by: &[Parameter]) -> Result<Vec<Gradient>> {
+        Parameter::check_each_once(by)?;
+        let each: Vec<_> = by.iter().map(|parameter| vec![(*parameter, 1.0)]).collect();
+        self.along(&each)
+    }
+
+    /// Derivatives of what each command led to along one change of parameters together, each so much: the product J dp, the one slope of
+    /// each [`Gradient`].
+    ///
+    /// # Errors
+    /// As [`Recorded::gradients`]; no change.
+    pub fn jvp(&self, along: &[(Parameter, f64)]) -> Result<Vec<Gradient>> {
         Parameter::check_each_once(along.iter().map(|(parameter, _)| parameter))?;
+        self.along(&[along.to_vec()])
+    }
+
+    fn along(&self, along: &[Together]) -> Result<Vec<Gradient>> {
         let simulation = &self.simulation;
-        self.tape.push(&surroundings!(simulation, simulation.time_s), along)
+        let slopes = self.tape.push(&surroundings!(simulation, simulation.time_s), along)?;
+        let each = self.passed().iter().cloned().zip(slopes);
+        Ok(each
+            .map(|(Passed { report, shape, margin }, slopes)| Gradient { report, shape, slopes, margin })
+            .collect())
+    }
+
+    /// What each command leads to where a parameter is larger by so much, solved anew at the same contacts and in the same parts.
+    #[cfg(test)]
+    pub(super) fn solved(&self, by: (Parameter, f64)) -> Result<Vec<Vec<f64>>> {
+        let simulation = &self.simulation;
+        self.tape.solved(&surroundings!(simulation, simulation.time_s), by)
     }
 }

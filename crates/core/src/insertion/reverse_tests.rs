@@ -1,11 +1,11 @@
-//! The reverse pass against the forward one over the same parts, against gradients from sides, and its cost.
+//! The reverse pass against the forward one over the same parts, and its cost.
 
 use std::time::Instant;
 
 use super::gradient_tests::{Numbers, SCENES, parameters, simulation, then_s};
 use super::{Move, Recorded, Simulation};
 use crate::Vec3;
-use crate::methods::{Parameter, Weights};
+use crate::methods::{Gradient, Parameter, Weights};
 
 /// A simulation after some commands, the next ones and their times.
 fn before(scene: usize, seed: u64, commands: usize) -> (Simulation, Vec<Vec<Move>>, Vec<f64>) {
@@ -42,19 +42,26 @@ fn weights(recording: &Recorded, instruments: usize) -> Vec<Weights> {
 }
 
 /// The sum of numbers with their weights.
-fn sum(weights: &[Weights], numbers: &[Weights]) -> f64 {
+fn sum(weights: &[Weights], gradients: &[Gradient]) -> f64 {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let each = weights.iter().zip(numbers).map(|(a, b)| {
+    let each = weights.iter().zip(gradients).map(|(a, b)| {
+        let b = &b.slopes[0];
+        let pushes: Vec<f64> = b.push_force_n.iter().map(|push_n| push_n.unwrap_or(0.0)).collect();
         let places = a.positions_mm.iter().zip(&b.positions_mm).map(|(a, b)| a.dot(b)).sum::<f64>();
         places
             + a.tip_mm.dot(&b.tip_mm)
             + a.energy_mj * b.energy_mj
-            + dot(&a.push_force_n, &b.push_force_n)
+            + dot(&a.push_force_n, &pushes)
             + dot(&a.torque_nmm, &b.torque_nmm)
             + dot(&a.contact_forces_n, &b.contact_forces_n)
     });
     each.sum()
 }
+
+/// Push forces of several instruments are slopes of an energy, differenced once more: along a direction forwards, by each unknown backwards. Forwards
+/// they are always read, and then columns are differences that are in closed form where they are not.
+const OF_SEVERAL: [f64; 2] = [1e-6, 1e-5];
+const OF_ONE: [f64; 2] = [1e-9; 2];
 
 #[test]
 fn backwards_and_forwards_are_the_same() {
@@ -63,29 +70,34 @@ fn backwards_and_forwards_are_the_same() {
         let instruments = now.stack().instruments().len();
         let by = parameters(instruments, SCENES[scene].friction);
         let recording = now.record(&commands, &times_s).unwrap();
-        let weights = weights(&recording, instruments);
-        let back = recording.vjp(&weights, &by).unwrap();
-        let scale = back.by.iter().fold(0.0f64, |most, one| most.max(one.abs()));
-        for (parameter, back) in by.iter().zip(&back.by) {
-            let on = sum(&weights, &recording.jvp(&[(*parameter, 1.0)]).unwrap());
-            let off = (on - back).abs() / on.abs().max(1e-6 * scale);
-            println!("{scene} {parameter:?}: {on:.6e} {off:.1e}");
-            assert!(off < 1e-9, "{scene} {parameter:?}: {on} {back}");
-        }
-        // With other weights it is another one.
-        let fewer = recording.vjp_by(&weights[..2], &by).unwrap();
-        assert!(fewer.by.iter().zip(&back.by).any(|(a, b)| (a - b).abs() > 1e-3 * b.abs()));
-        assert!(fewer.hands.is_empty() && back.hands.len() == 3);
-        // The first command's hands are parameters too.
-        for (parameter, back) in by.iter().zip(&back.by) {
-            match *parameter {
-                Parameter::Advance { instrument } => {
-                    assert_eq!(back.to_owned(), first(&recording, &weights, instrument).0);
+        let all = weights(&recording, instruments);
+        let mut without = all.clone();
+        without.iter_mut().for_each(|one| one.push_force_n.clear());
+        let most = if instruments == 1 { OF_ONE } else { OF_SEVERAL };
+        for (weights, most) in [without, all].into_iter().zip(most) {
+            let back = recording.vjp(&weights, &by).unwrap();
+            let scale = back.by.iter().fold(0.0f64, |most, one| most.max(one.abs()));
+            for (parameter, back) in by.iter().zip(&back.by) {
+                let on = sum(&weights, &recording.jvp(&[(*parameter, 1.0)]).unwrap());
+                let off = (on - back).abs() / on.abs().max(1e-6 * scale);
+                println!("{scene} {parameter:?}: {on:.6e} {off:.1e}");
+                assert!(off < most, "{scene} {parameter:?}: {on} {back}");
+            }
+            // With other weights it is another one.
+            let fewer = recording.vjp_by(&weights[..2], &by).unwrap();
+            assert!(fewer.by.iter().zip(&back.by).any(|(a, b)| (a - b).abs() > 1e-3 * b.abs()));
+            assert!(fewer.hands.is_empty() && back.hands.len() == 3);
+            // The first command's hands are parameters too.
+            for (parameter, back) in by.iter().zip(&back.by) {
+                match *parameter {
+                    Parameter::Advance { instrument } => {
+                        assert_eq!(back.to_owned(), first(&recording, &weights, instrument).0);
+                    }
+                    Parameter::Rotation { instrument } => {
+                        assert_eq!(back.to_owned(), first(&recording, &weights, instrument).1);
+                    }
+                    _ => {}
                 }
-                Parameter::Rotation { instrument } => {
-                    assert_eq!(back.to_owned(), first(&recording, &weights, instrument).1);
-                }
-                _ => {}
             }
         }
     }
@@ -96,39 +108,19 @@ fn first(recording: &Recorded, weights: &[Weights], instrument: usize) -> (f64, 
     (hand.advance_mm, hand.rotate_rad)
 }
 
-/// A tube without friction, with it, and one that moves.
-const ALONE: [usize; 3] = [0, 2, 4];
-/// Gradients from sides are no nearer than this, relative to that of the tip, where the vessel moves.
-const OF_SIDES: f64 = 5e-3;
-
 #[test]
-fn backwards_it_is_the_gradient_of_the_commands() {
-    for scene in ALONE {
+fn recorded_or_not_steps_take_the_same() {
+    for scene in [0, 2, 4] {
         let (now, commands, times_s) = before(scene, 300 + scene as u64, 3);
-        let by = parameters(1, SCENES[scene].friction);
         let recording = now.record(&commands, &times_s).unwrap();
-        let gradients = now.gradients_until(&commands, &times_s, &by).unwrap();
         let mut alone = now.clone();
+        let mut last = None;
         for ((moves, time_s), passed) in commands.iter().zip(&times_s).zip(recording.passed()) {
-            // Recorded or not, steps take the same.
-            assert_eq!(alone.step_until(moves, Some(*time_s)).unwrap(), &passed.report);
+            let report = alone.step_until(moves, Some(*time_s)).unwrap();
+            assert_eq!(report, &passed.report);
+            // Each command leads elsewhere.
+            assert_ne!(last.replace(report.clone()).as_ref(), Some(report));
         }
-        let slopes: Vec<Vec3> = gradients[2].slopes.iter().map(|slope| slope.tip_mm).collect();
-        let none = Weights::default();
-        let back = [0, 1, 2].map(|axis| {
-            let last = Weights { tip_mm: Vec3::ith(axis, 1.0), ..none.clone() };
-            recording.vjp_by(&[none.clone(), none.clone(), last], &by).unwrap().by
-        });
-        for (k, parameter) in by.iter().enumerate() {
-            let own = Vec3::new(back[0][k], back[1][k], back[2][k]);
-            // What barely moves the tip has no digits in common.
-            if slopes[k].norm() > 1e-4 {
-                let off = (own - slopes[k]).norm() / slopes[k].norm();
-                assert!(off < OF_SIDES, "{scene} {parameter:?}: {own:?} {:?}", slopes[k]);
-            }
-        }
-        // One parameter is not another.
-        assert!((back[0][0] - slopes[1].x).abs() > 1e-3 * slopes[1].norm());
     }
 }
 

@@ -1,6 +1,6 @@
 //! Derivatives of what a command leads to.
 
-use crate::methods::{Command, Energy, Parameter, StepReport, Surroundings};
+use crate::methods::{Command, Parameter, StepReport, Surroundings};
 use crate::shape::Shape;
 use crate::{Result, Vec3};
 
@@ -20,7 +20,7 @@ pub struct Gradient {
     pub margin: Margin,
 }
 
-/// Derivatives in one parameter, per unit of it.
+/// Derivatives in one parameter, per unit of it, or along a change of several.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Slope {
     /// Of the tip, mm.
@@ -31,8 +31,8 @@ pub struct Slope {
     pub push_force_n: Vec<Option<f64>>,
     /// Of the torque of each hand, N·mm.
     pub torque_nmm: Vec<f64>,
-    /// Of the energy terms, mJ.
-    pub energy: Energy,
+    /// Of the whole stored energy, mJ.
+    pub energy_mj: f64,
     /// Of the normal forces of the contacts of the [`Gradient::report`], N. Empty if a contact opens or closes right there.
     pub contact_forces_n: Vec<f64>,
     /// Whether it is the slope on one side only: right there a contact opens or closes, or a node of the mesh comes in.
@@ -100,9 +100,13 @@ pub trait Tape: Send + Sync {
     fn pull(&self, first: &Surroundings<'_>, weights: &[Weights], by: (&[Parameter], bool))
     -> Result<Pulled>;
 
-    /// Changes of what each command leads to for small changes of parameters, in the order of their weights.
+    /// Derivatives of what each command leads to, one along each change of parameters together, each so much.
     ///
     /// # Errors
-    /// A parameter that does not exist.
-    fn push(&self, first: &Surroundings<'_>, along: &[(Parameter, f64)]) -> Result<Vec<Weights>>;
+    /// A parameter that does not exist, no change, and a result that has no derivative.
+    fn push(&self, first: &Surroundings<'_>, along: &[Vec<(Parameter, f64)>]) -> Result<Vec<Vec<Slope>>>;
+
+    /// What each command leads to where a parameter is larger by so much, solved anew at the same contacts and in the same parts.
+    #[cfg(test)]
+    fn solved(&self, first: &Surroundings<'_>, by: (Parameter, f64)) -> Result<Vec<Vec<f64>>>;
 }

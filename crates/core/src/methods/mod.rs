@@ -179,26 +179,11 @@ pub trait Method: Send {
         None
     }
 
-    /// Derivatives of what commands lead to, one after the other, each with the time after it, s, from the state as it is; the state
-    /// does not change. A derivative is by parameters that change together, each so much. Each command was `checked` against the report
-    /// before it.
+    /// Carries out commands, one after the other, each with the time after it, s, from the state as it is, and records them to be
+    /// differentiated; the state does not change. Each command was `checked` against the report before it.
     ///
     /// # Errors
-    /// A method without gradients; as [`Method::step`]; a parameter that does not exist, and a result that has no derivative.
-    fn gradients(
-        &self,
-        _surroundings: &Surroundings<'_>,
-        _commands: Timed<'_>,
-        _by: &[Vec<(Parameter, f64)>],
-        _checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
-    ) -> Result<Vec<Gradient>> {
-        Err(Error::parameter("method.name", "another one", "this method has no gradients: use kirchhoff"))
-    }
-
-    /// Carries out commands as [`Method::gradients`] does, from the state as it is, and records them; the state does not change.
-    ///
-    /// # Errors
-    /// As [`Method::gradients`], without parameters.
+    /// A method without gradients; as [`Method::step`]; a result that has no derivative.
     fn record(
         &self,
         _surroundings: &Surroundings<'_>,

@@ -5,7 +5,7 @@ With residuals r(p) = (computed − observed)/sigma, the simulation's gradients 
     (JᵀJ + P) δ = −(Jᵀr + P (p − p₀))
 
 with P the inverse covariance of the prior, if there is one (Nocedal and Wright, Numerical Optimization, 2nd ed., section 10.3). A
-step that does not lower the sum of squares is halved. At the end (JᵀJ + P)⁻¹ is the covariance of the parameters, as far as the model is
+step that does not lower the sum of squares is halved; one that promises to lower it by less than equilibria are exact is the last. At the end (JᵀJ + P)⁻¹ is the covariance of the parameters, as far as the model is
 linear within it and the residuals are independent with the given sigma.
 """
 
@@ -17,16 +17,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._endowire import Gradient, Simulation
+from ._endowire import Gradient, Recorded, Simulation
 from .errors import ComputationError, InputError
 
 __all__ = ["Fit", "Observed", "fit"]
 
-#: Steps are halved at most so often; below that the sum of squares is at its least to rounding.
+#: Steps are halved at most so often.
 HALVINGS = 12
+#: A step that promises to lower the sum of squares by less, a tenth of a standard deviation squared, and does not, is the last: equilibria
+#: with friction are no more exact than that.
+PROMISED = 1e-2
 #: A direction in which the data say less than this fraction of what they say in the clearest one, each parameter in units of its own
 #: value, is not shown by them.
 SHOWN = 1e-6
+#: A value so small is nought but for rounding, and no unit.
+ROUNDED = 1e-12
 ENERGIES = ("bend", "twist", "wall", "field", "tail", "vessel")
 
 
@@ -84,7 +89,7 @@ class Observed:
         if self.of in ("points", "pixels"):
             places, slopes = self._places(gradient)
             if self.of == "points":
-                return places.ravel(), slopes.reshape(-1, slopes.shape[-1])
+                return places.ravel(), slopes.reshape(places.size, -1)
             return self._seen(places, slopes)
         try:
             return numbers(gradient, self.of), gradient.of(self.of)
@@ -120,7 +125,7 @@ class Observed:
         moved = np.einsum("ab,nbp->nap", camera[:, :3], slopes)
         pixels = image[:, :2] / image[:, 2:]
         slope = (moved[:, :2] - pixels[:, :, None] * moved[:, 2:]) / image[:, 2:, None]
-        return pixels.ravel(), slope.reshape(-1, slope.shape[-1])
+        return pixels.ravel(), slope.reshape(pixels.size, -1)
 
 
 @dataclass
@@ -193,40 +198,54 @@ def fit(
     weights = np.array([prior[name][1] ** -2 if name in prior else 0.0 for name in free])
     last = max(one.after for one in observed) + 1
 
-    def at(values: NDArray[np.float64]) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-        there = simulation.changed(dict(zip(free, values.tolist())))
-        gradients = there.gradients(moves[:last], by=free)
-        parts = [one.residual(gradients[one.after]) for one in observed]
-        residual, jacobian = np.concatenate([r for r, _ in parts]), np.concatenate([j for _, j in parts])
-        return float(residual @ residual + weights @ (values - means) ** 2), residual, jacobian
+    def led_to(values: NDArray[np.float64]) -> tuple[float, Recorded]:
+        """The sum of squares with these values, and the commands to differentiate."""
+        recorded = simulation.changed(dict(zip(free, values.tolist()))).recorded(moves[:last])
+        states = recorded.gradients(by=[])
+        residual = np.concatenate([one.residual(states[one.after])[0] for one in observed])
+        return float(residual @ residual + weights @ (values - means) ** 2), recorded
 
-    cost, residual, jacobian = at(values)
+    def slopes(recorded: Recorded) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        gradients = recorded.gradients(by=free)
+        parts = [one.residual(gradients[one.after]) for one in observed]
+        return np.concatenate([r for r, _ in parts]), np.concatenate([j for _, j in parts])
+
+    cost, recorded = led_to(values)
+    residual, jacobian = slopes(recorded)
     converged, iterations = False, 0
     # In units of the values themselves numbers of all kinds compare.
-    units = np.where(values != 0.0, np.abs(values), 1.0)
+    units = np.where(np.abs(values) > ROUNDED, np.abs(values), 1.0)
     while not converged and iterations < most_iterations:
         iterations += 1
         normal = jacobian.T @ jacobian + np.diag(weights)
         right = -(jacobian.T @ residual + weights * (values - means))
         step = _solve(normal * np.outer(units, units), right * units) * units
+        failed: Exception | None = None
         for halving in range(HALVINGS):
-            tried = values + 0.5**halving * step
+            part = 0.5**halving
             try:
-                found = at(tried)
+                found = led_to(values + part * step)
+                lower = found[0] <= cost * (1.0 + 1e-12)
+                derived = slopes(found[1]) if lower else (residual, jacobian)
             except (ComputationError, InputError) as error:
-                failed: Exception | None = error
+                failed = error
                 continue
             failed = None
-            if found[0] <= cost * (1.0 + 1e-12):
+            if lower:
+                break
+            if (2.0 - part) * part * float(step @ right) < PROMISED:
+                converged = True
                 break
         else:
             if failed is not None and iterations == 1:
                 raise ComputationError(f"fit: no step from the values at the beginning: {failed}") from failed
-            converged = failed is None
+            break
+        if converged:
             break
         sigma = np.sqrt(np.diag(_inverse(normal * np.outer(units, units)))) * units
-        converged = bool(np.all(np.abs(tried - values) <= tolerance * np.maximum(np.minimum(sigma, units), 1e-300)))
-        values, (cost, residual, jacobian) = tried, found
+        most = tolerance * np.maximum(np.minimum(sigma, units), 1e-300)
+        converged = bool(np.all(np.abs(part * step) <= most))
+        values, cost, (residual, jacobian) = values + part * step, found[0], derived
     normal = (jacobian.T @ jacobian + np.diag(weights)) * np.outer(units, units)
     return Fit(
         free=free,

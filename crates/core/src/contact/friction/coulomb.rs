@@ -131,6 +131,14 @@ impl Coulomb {
         (by_force, by_force.tr_mul(&spin) + turn.tr_mul(&force))
     }
 
+    /// Derivatives of the friction force and moment of a slider, at this place and angle, in ε.
+    pub(in crate::contact) fn by_stick(&self, slider: &Slider, (x, angle): (&Vec3, f64)) -> (Vec3, f64) {
+        let (slip, spin) = slider.slip(x, angle);
+        let part = slip.norm() / self.stick_mm;
+        let force = slip * (2.0 * self.largest_n(slider) * (part - 1.0).min(0.0) / self.stick_mm.powi(2));
+        (force, force.dot(&spin))
+    }
+
     /// Lower and upper estimate of the energy dissipated in the step, mJ: with the normal forces of its start and of
     /// its end, at contacts with these places and angles.
     pub(in crate::contact) fn dissipated_mj<'a>(

@@ -73,6 +73,8 @@ pub(crate) struct FrictionSlopes {
     pub(crate) by_place: BySpace,
     /// In the direction that the device had there.
     pub(crate) by_direction: BySpace,
+    /// In the slip within which it sticks.
+    pub(crate) by_stick: (Vec3, f64),
 }
 
 /// What presses at a place.
@@ -123,7 +125,8 @@ impl WallContact<'_> {
             (lagging.0, lagging.1) = (lagging.0 + force, lagging.1 + moment);
             (by_place.0, by_place.1) = (by_place.0 + f.hessian + force, f.mixed + moment);
             rubs = (f.gradient, f.turn);
-            Some(slider_slopes(slider, &f.hessian, &f.gradient, angle))
+            let by_stick = self.friction.law.by_stick(slider, (&x, angle));
+            Some(FrictionSlopes { by_stick, ..slider_slopes(slider, &f.hessian, &f.gradient, angle) })
         });
         let at = self.pressing_at(index, d);
         let acts = PointForces {
@@ -215,5 +218,6 @@ fn slider_slopes(slider: &Slider, hessian: &Matrix3<f64>, force: &Vec3, angle: f
         by_spin: (mixed, mixed.dot(&spin)),
         by_place: (-hessian, -mixed),
         by_direction: (hessian * turn * spun_rad, turn.tr_mul(&mixed) * spun_rad + turn.tr_mul(force)),
+        by_stick: (Vec3::zeros(), 0.0),
     }
 }

@@ -18,7 +18,7 @@ use super::configuration::Start;
 use super::course::{Course, Next, Rest};
 use super::extrapolation::Correction;
 use super::hands::{lengths, line_advance_mm, set_motions};
-use super::nearby::Follows;
+use super::nearby::Recorder;
 use super::part::Effort;
 use super::report::Took;
 use super::state::{KirchhoffState, UnderWay};
@@ -80,19 +80,19 @@ impl<const C: usize> Workspace<C> {
         moves: &[Move],
         solves: usize,
     ) -> Result<Driven> {
-        self.carry_out_beside(environment, from, (moves, solves), None)
+        self.carry_out_recorded(environment, from, (moves, solves), None)
     }
 
-    /// As [`Workspace::carry_out`], and follows what slightly other parameters lead to.
+    /// As [`Workspace::carry_out`], and records the parts.
     ///
     /// # Errors
     /// As [`Method::step`](crate::methods::Method::step), and where there is no derivative.
-    pub(super) fn carry_out_beside(
+    pub(super) fn carry_out_recorded(
         &mut self,
         environment: &Environment<'_>,
         from: &KirchhoffState,
         (moves, solves): (&[Move], usize),
-        mut beside: Option<&mut dyn Follows<C>>,
+        mut recorder: Option<&mut Recorder>,
     ) -> Result<Driven> {
         self.begin(environment, from, moves)?;
         let Self { tools, mesh, now, next, way, hands, .. } = self;
@@ -148,8 +148,8 @@ impl<const C: usize> Workspace<C> {
                     let openings = surroundings.lumen.openings();
                     let goes_on = check_inside(openings, line, 0.0).and_then(|()| {
                         let to = (&*next.state, &way.target[..]);
-                        beside.as_mut().map_or(Ok(()), |beside| {
-                            beside.follow(tools, &there, (was, passage), (attempt, &found), to)
+                        recorder.as_mut().map_or(Ok(()), |recorder| {
+                            recorder.follow(&there, (was, passage), (attempt, &found), to)
                         })
                     });
                     if let Err(ended) = goes_on {

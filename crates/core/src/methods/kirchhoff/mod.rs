@@ -104,9 +104,7 @@ use std::sync::Arc;
 
 use crate::contact::{ContactSurface, Counters, Touching};
 use crate::device::line_mm;
-use crate::methods::{
-    Command, DetachedCoil, Gradient, LateralForce, Move, Parameter, StepReport, Surroundings, Tape, Timed,
-};
+use crate::methods::{Command, DetachedCoil, LateralForce, Move, StepReport, Surroundings, Tape, Timed};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;
@@ -365,16 +363,6 @@ impl<const C: usize> Method for Kirchhoff<C> {
             report.converged = false;
         }
         done
-    }
-
-    fn gradients(
-        &self,
-        surroundings: &Surroundings<'_>,
-        commands: Timed<'_>,
-        by: &[Vec<(Parameter, f64)>],
-        checked: &dyn Fn(&StepReport, &[Move]) -> Result<()>,
-    ) -> Result<Vec<Gradient>> {
-        self.gradients_of(surroundings, (commands, by), checked)
     }
 
     fn record(

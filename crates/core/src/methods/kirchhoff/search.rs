@@ -385,11 +385,6 @@ impl<const C: usize> Search<'_, '_, C> {
         }
     }
 
-    /// Whether forces are lagged, and so missing in the matrix.
-    pub(super) fn lags(&mut self, lagged: &Lagged<'_>) -> bool {
-        self.has_friction || lagged.flow.is_some() || !self.contact.between().places().is_empty()
-    }
-
     /// As [`Search::assemble`], with lagged forces as they were.
     pub(super) fn assemble_once(&mut self, hessian: bool) {
         let elements = self.elements;

@@ -24,7 +24,6 @@
 //! Other parameters have the difference of all forces between two scenes; so have these where forces between instruments or of blood follow the
 //! whole line, and all but sections where push forces of several instruments are read.
 
-use super::super::Environment;
 use super::super::configuration::Configuration;
 use super::super::hands::steered;
 use super::super::material::element;
@@ -33,7 +32,7 @@ use super::super::workspace::Tools;
 use super::Scene;
 use super::numbers::{Around, Found, Numbers, tail_numbers};
 use super::remembered::{Entered, Scatter};
-use super::singular;
+use crate::Vec3;
 use crate::contact::PressingSlopes;
 use crate::device::Stack;
 use crate::field::FieldLoad;
@@ -41,7 +40,6 @@ use crate::methods::{Parameter, Surroundings};
 use crate::rod::element::ElementSystem;
 use crate::rod::{Assembly, ElementData, Layout, element_energy, element_gradients, element_system};
 use crate::solve::External;
-use crate::{Result, Vec3};
 
 /// Derivatives in one number, at the same end.
 #[derive(Debug, Clone, Default)]
@@ -76,11 +74,7 @@ pub(super) struct Local<'a> {
 impl Local<'_> {
     /// The column of a parameter by what it changes itself; none where that is more than this knows.
     pub(super) fn column<const C: usize>(&self, tools: &mut Tools<C>, beside: &Beside) -> Option<Column> {
-        let mut to = Column {
-            right: vec![0.0; Layout::<C>::dimension(self.at.state.rod.elements())],
-            numbers: vec![0.0; self.numbers.len()],
-            ..Column::default()
-        };
+        let mut to = self.nothing::<C>();
         match beside.parameter {
             Parameter::BendingStiffness { instrument, section }
             | Parameter::TorsionalStiffness { instrument, section }
@@ -101,13 +95,22 @@ impl Local<'_> {
         Some(to)
     }
 
+    /// A column that changes nothing.
+    pub(super) fn nothing<const C: usize>(&self) -> Column {
+        Column {
+            right: vec![0.0; Layout::<C>::dimension(self.at.state.rod.elements())],
+            numbers: vec![0.0; self.numbers.len()],
+            ..Column::default()
+        }
+    }
+
     /// Where the energy is read; none where it is not.
     fn energy(&self) -> Option<usize> {
         (self.around.piece.is_last && self.reads[0]).then(|| self.numbers.energy())
     }
 
     /// Whether push forces are read that know contacts and fields all along the line: those of several instruments.
-    fn pushes_are_of_the_line(&self) -> bool {
+    pub(super) fn pushes_are_of_the_line(&self) -> bool {
         self.is_last() && self.reads[1] && self.numbers.instruments > 1
     }
 
@@ -224,7 +227,7 @@ impl Local<'_> {
         }
     }
 
-    /// Of the twist of tails.
+    /// Of the twist of tails, of instruments of other materials.
     fn add_tails<const C: usize>(
         &self,
         tools: &mut Tools<C>,
@@ -232,14 +235,26 @@ impl Local<'_> {
         between: f64,
         to: &mut Column,
     ) {
-        let (l, piece, rod) = (Layout::<C>, self.around.piece, &self.at.state.rod);
-        let begin = |tails: &mut Tails, environment: &Environment<'_>| {
-            tails.begin(environment, (&piece.was.state, &piece.hands));
+        let piece = self.around.piece;
+        let begin = |tails: &mut Tails, side: usize| {
+            let environment = self.around.environment.steered(&stacks[side]);
+            tails.begin(&environment, (&piece.was.state, &piece.hands));
         };
+        self.add_twists(tools, (stacks.each_ref().map(|stack| &**stack), &begin), between, to);
+    }
+
+    /// Of the twist of tails that begin so on both sides.
+    pub(super) fn add_twists<const C: usize>(
+        &self,
+        tools: &mut Tools<C>,
+        (stacks, begin): ([&Stack; 2], &dyn Fn(&mut Tails, usize)),
+        between: f64,
+        to: &mut Column,
+    ) {
+        let (l, piece, rod) = (Layout::<C>, self.around.piece, &self.at.state.rod);
         let mut spins = vec![0.0; self.entered.len()];
         for (side, sign) in [(0, -1.0 / between), (1, 1.0 / between)] {
-            let stack = &stacks[side];
-            begin(&mut tools.tails, &self.around.environment.steered(stack));
+            begin(&mut tools.tails, side);
             for tail in tools.tails.each() {
                 if let Some(set) = tail.set.filter(|_| tail.is_in) {
                     to.right[l.angle(0, set)] += sign * tail.on(rod).body_nmm;
@@ -247,14 +262,14 @@ impl Local<'_> {
             }
             for (spin, (_, entered)) in spins.iter_mut().zip(self.entered) {
                 for Entered { instrument, from_tip_mm, weight } in entered {
-                    let angle = tools.tails.angle_before(stack, *instrument, *from_tip_mm);
+                    let angle = tools.tails.angle_before(stacks[side], *instrument, *from_tip_mm);
                     *spin -= sign * weight * angle;
                 }
             }
             let numbers = tail_numbers(tools, &self.around.environment, self.numbers, self.at);
             to.numbers.iter_mut().zip(&numbers).for_each(|(to, own)| *to += sign * own);
         }
-        begin(&mut tools.tails, &self.around.environment);
+        tools.tails.begin(&self.around.environment, (&piece.was.state, &piece.hands));
         let friction = self.pressing.iter().filter_map(|at| Some((at.index, at.friction.as_ref()?)));
         for ((index, friction), spin) in friction.zip(&spins) {
             let (force, moment) = friction.by_spin;
@@ -263,7 +278,7 @@ impl Local<'_> {
     }
 
     /// Adds a force and a moment at a point, as gradients.
-    fn add_at<const C: usize>(&self, index: usize, (force, moment): (Vec3, f64), to: &mut Column) {
+    pub(super) fn add_at<const C: usize>(&self, index: usize, (force, moment): (Vec3, f64), to: &mut Column) {
         let Configuration { mesh, state } = self.at;
         Scatter::at::<C>(&state.rod, mesh, index).add((force, moment), |row, own| to.right[row] -= own);
     }
@@ -348,18 +363,15 @@ impl Local<'_> {
     }
 }
 
-/// The column from two sides, of which one may have another mesh.
-///
-/// # Errors
-/// Another mesh on both sides.
-pub(super) fn column(sides: &[(f64, Option<Found>); 2], here: &Found) -> Result<Column> {
+/// The column from two sides, of which one may have another mesh; none where both have.
+pub(super) fn column(sides: &[(f64, Option<Found>); 2], here: &Found) -> Option<Column> {
     let mut one_sided = false;
     let mut by = [0.0; 2];
     for (by, (step, found)) in by.iter_mut().zip(sides) {
         one_sided |= found.as_ref().is_none_or(|found| !found.same_contacts);
         *by = if found.is_some() { *step } else { 0.0 };
     }
-    let whole = if by[1] == by[0] { return Err(singular()) } else { by[1] - by[0] };
+    let whole = if by[1] == by[0] { return None } else { by[1] - by[0] };
     let [less, more] = sides.each_ref().map(|(_, found)| found.as_ref().unwrap_or(here));
     let slope = |less: &[f64], more: &[f64], sign: f64| -> Vec<f64> {
         less.iter().zip(more).map(|(less, more)| sign * (more - less) / whole).collect()
@@ -372,7 +384,7 @@ pub(super) fn column(sides: &[(f64, Option<Found>); 2], here: &Found) -> Result<
             slope(less.as_ref().unwrap_or(&nothing), more.as_ref().unwrap_or(&nothing), 1.0)
         }
     };
-    Ok(Column {
+    Some(Column {
         right: slope(&less.rows, &more.rows, -1.0),
         along,
         numbers: slope(&less.numbers, &more.numbers, 1.0),

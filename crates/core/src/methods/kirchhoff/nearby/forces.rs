@@ -1,4 +1,4 @@
-//! The forces at the end of a part and beside it, and the motions that balance small ones.
+//! The forces at the end of a part and beside it.
 
 use std::convert::Infallible;
 
@@ -9,21 +9,15 @@ use super::super::search::{Beginning, Bounds, Lagged, Search};
 use super::super::state::KirchhoffState;
 use super::super::workspace::Tools;
 use super::sparse::Sparse;
-use super::{Acting, End, STICKING, singular};
+use super::{Acting, End, STICKING};
+use crate::Vec3;
 use crate::methods::Sheath;
-use crate::methods::kirchhoff::Environment;
 use crate::rod::{ElementData, Frame, Layout, RodState};
-use crate::solve::gmres;
-use crate::{Result, Vec3};
 
-/// Largest rotation, rad, of a node in the differences along a direction; as [`super::STEP`].
+/// Largest rotation, rad, in the differences along an unknown; as [`super::STEP`].
 const TURN_RAD: f64 = 3e-6;
-/// Accuracy of dx/dp, and the most products for it.
-const ACCURACY: (f64, usize) = (1e-9, 60);
 /// A sheath so much elsewhere, mm and rad, is where it was.
 const ROUNDED: f64 = 1e-12;
-/// With a larger residual dx/dp is not found.
-const LEAST_ACCURACY: f64 = 1e-5;
 
 impl<const C: usize> Tools<C> {
     /// Begins a part on one side and calls `what` at the configuration of its end, with the triads from which spin is measured there.
@@ -71,29 +65,6 @@ impl<const C: usize> Tools<C> {
         Some((found, slid))
     }
 
-    /// Completes the state at the end of a part: that after the way if its forces were assembled for what `reads` them, or else
-    /// the one before it, which then goes.
-    pub(super) fn finish(
-        &mut self,
-        acting: &Acting<'_>,
-        (own, reads): (Environment<'_>, bool),
-        (way, by): (&[f64], f64),
-        next: &mut Configuration,
-    ) {
-        if reads {
-            let (mesh, after) = next.parts();
-            self.keep(acting.start, mesh, after);
-            self.write_forces(&own, next);
-            return;
-        }
-        let hands = acting.attempt.hands;
-        self.tails.begin(&own, (acting.start.state, hands));
-        let (mesh, after) = next.parts();
-        let KirchhoffState { rod, twists, hand_forces, across_n, .. } = after;
-        advance::<C>(&mesh.elements, &rod.clone(), (way, by), rod);
-        self.tails.write((own.surroundings.sheath, *across_n), rod, twists, hand_forces);
-    }
-
     /// The triads of the device in the part that was begun last, slid and not yet solved; none without friction.
     fn slid_triads(&self, next: &Configuration) -> Vec<Frame> {
         let moved = &self.guess.before_motion;
@@ -102,57 +73,6 @@ impl<const C: usize> Tools<C> {
             (false, _) => Vec::new(),
             (true, true) => next.state.rod.frames.clone(),
             (true, false) => moved.clone(),
-        }
-    }
-
-    /// The motion that balances these forces at the end of a part, whose matrix has been factored.
-    pub(super) fn respond(
-        &mut self,
-        (nominal, end): (&Acting<'_>, &End<'_>),
-        (right, lags, most_mm): (&[f64], bool, f64),
-        next: &mut Configuration,
-    ) -> Result<Vec<f64>> {
-        let found = self.beside(nominal, end, next, |search, lagged, triads| {
-            let (elements, base) = (search.elements, search.state.clone());
-            let mut way = right.to_vec();
-            search.newton.apply_inverse(elements, &mut way);
-            // All of it is in Newton's matrix.
-            if !lags {
-                return (way, 0.0);
-            }
-            let apply = |way: &[f64]| {
-                let (turn, twist) = RodState::largest_turn::<C>(elements, &base, way);
-                let turned = TURN_RAD / turn.max(twist).max(f64::MIN_POSITIVE);
-                let part = turned.min(most_mm / longest_mm::<C>(way).max(f64::MIN_POSITIVE));
-                // What lags follows from the equilibrium, and stays or follows from the states beside it.
-                search.state.copy_from(&base);
-                search.contact.follow_depths();
-                search.assemble(lagged, false);
-                search.contact.hold_friction();
-                let mut forces = [-part, part].map(|part| {
-                    go(search, &base, (way, part), &[]);
-                    search.assemble_once(false);
-                    rows(search)
-                });
-                search.contact.follow_depths();
-                for (stays, part) in forces.iter_mut().zip([-part, part]) {
-                    go(search, &base, (way, part), triads);
-                    search.assemble(lagged, false);
-                    stays.iter_mut().zip(rows(search)).for_each(|(stays, follows)| *stays = follows - *stays);
-                }
-                let [less, more] = forces;
-                let mut lagging: Vec<f64> =
-                    less.iter().zip(&more).map(|(less, more)| (more - less) / (2.0 * part)).collect();
-                search.newton.apply_inverse(elements, &mut lagging);
-                way.iter().zip(&lagging).map(|(way, lagging)| way + lagging).collect()
-            };
-            gmres(&way, ACCURACY, apply)
-        });
-        match found {
-            Some(((way, off), _)) if off <= LEAST_ACCURACY && way.iter().all(|part| part.is_finite()) => {
-                Ok(way)
-            }
-            _ => Err(singular()),
         }
     }
 }

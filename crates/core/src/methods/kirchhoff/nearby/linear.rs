@@ -24,20 +24,21 @@
 //! way. Where the mesh or a contact changes within the difference of a column that column holds on one side only.
 
 use super::super::configuration::{Configuration, Start};
-use super::super::hands::Hand;
-use super::super::meshed;
 use super::super::search::{Lagged, Search};
 use super::super::workspace::Tools;
+use super::chain::{Chain, Memory, WRENCH};
 use super::columns::{Beside, Column, Local, column};
 use super::forces::{lagging_everywhere, rows, spins};
-use super::numbers::{Around, Found, Numbers, Wanted};
+use super::lagging::add_moments;
+use super::numbers::{Around, Found, Numbers, Push, Wanted};
 use super::recorded::Piece;
-use super::remembered::{Between, Chain, Entered, Memory, WRENCH};
+use super::remembered::{Between, Entered};
+use super::reverse::motion;
 use super::sparse::{Row, Sparse};
-use super::{Acting, End, STEP, STICKING, Scene, own_scale, singular};
+use super::{Acting, End, Scene, singular};
 use crate::Result;
 use crate::contact::{Place, PressingSlopes};
-use crate::methods::Parameter;
+use crate::methods::Together;
 use crate::methods::kirchhoff::Environment;
 use crate::rod::{Frame, RodState, element_gradients};
 use crate::solve::{Inverse, gmres};
@@ -65,6 +66,12 @@ pub(super) struct Linear<const C: usize> {
     /// Numbers by the forces on what the mouth holds, and on places beyond.
     pub(super) mouth: Sparse,
     pub(super) held: Vec<usize>,
+    /// Contact points that rub on the wall.
+    pub(super) rubbing: Vec<usize>,
+    /// How triads from which spin is measured are turned against those of the slid device, rad.
+    pub(super) spins: Vec<f64>,
+    /// Whether push forces are read along each direction, not by rows.
+    pub(super) pushes_along: bool,
     /// Of each hand, and each of its three motions: by its position before and after the part.
     pub(super) hands: Vec<[Option<[Column; 2]>; 3]>,
     pub(super) scene: Vec<Column>,
@@ -98,7 +105,8 @@ impl<const C: usize> Linear<C> {
         let own_start = piece.was.start();
         let grips = environment.surroundings.sheath.friction > 0.0;
         let reads = piece.is_last || grips;
-        let reads_mouth = grips || (piece.is_last && wanted.push);
+        let pushes_along = piece.is_last && piece.hands.len() > 1 && !grips && wanted.push == Push::Along;
+        let reads_mouth = grips || (piece.is_last && wanted.push != Push::Unread && !pushes_along);
         let touches = piece.end().touches.iter().map(|(point, _)| *point).collect();
         let end = End { state: piece.end(), spins: Vec::new() };
         let mut around = Around { environment, piece, end, reads, touches };
@@ -135,6 +143,9 @@ impl<const C: usize> Linear<C> {
                     reads: Sparse::default(),
                     mouth: Sparse::default(),
                     held: at.held.clone(),
+                    rubbing: entered.iter().map(|(index, _)| *index).collect(),
+                    spins: Vec::new(),
+                    pushes_along,
                     hands: Vec::new(),
                     scene: Vec::new(),
                 };
@@ -148,6 +159,7 @@ impl<const C: usize> Linear<C> {
             linear.read_contacts(&around, next, &at.pressing);
         }
         around.end.spins = spins(&piece.end().rod, &slid);
+        linear.spins.clone_from(&around.end.spins);
         if at.lags {
             let dense = piece.with(&environment, &nominal, on, |acting, _| {
                 tools.beside(acting, &around.end, next, lagging_everywhere)
@@ -155,26 +167,29 @@ impl<const C: usize> Linear<C> {
             let ([lagging, slipping], _) = dense.ok_or_else(singular)?;
             (linear.lagging, linear.slipping) = (lagging, slipping);
         }
+        add_moments::<C>(&next.mesh, &at.pressing, &mut linear.lagging);
         let alone = piece.hands.len() == 1 && !at.lags;
         if reads_mouth && alone {
             linear.read_mouth(tools, &around, (&nominal, on), (&at.pressing, &at.at_mouth), next);
         } else if reads_mouth {
             linear.read_forces(tools, &around, (&nominal, on), &at, next);
         }
-        let own = linear.local_columns(tools, (&around, next), (&at, &entered), (wanted, scenes));
+        let (own, turned) = linear.local_columns(tools, (&around, next), (&at, &entered), (wanted, scenes));
         if piece.is_last && wanted.energy {
             linear.read_energy(tools, &around, (&nominal, on), next);
         }
         let stick_mm = tools.friction.stick_mm();
         if wanted.hands {
-            linear.hands = (0..piece.hands.len())
-                .map(|instrument| {
-                    [0, 1, 2].map(|motion| {
-                        let to = (instrument, motion, stick_mm);
-                        linear.hand(tools, &around, (&nominal, &here), to, next)
-                    })
-                })
-                .collect();
+            for (instrument, mut turned) in turned.into_iter().enumerate() {
+                let mut motions = [None, turned.take(), None];
+                for (motion, columns) in
+                    motions.iter_mut().enumerate().filter(|(_, columns)| columns.is_none())
+                {
+                    let to = (instrument, motion, stick_mm);
+                    *columns = linear.hand(tools, &around, (&nominal, &here), to, next)?;
+                }
+                linear.hands.push(motions);
+            }
         }
         for (beside, own) in scenes.iter().zip(own) {
             let mut by_sides = || {
@@ -182,33 +197,42 @@ impl<const C: usize> Linear<C> {
                 let found = sides.map(|(by, scene)| (*by, around.found::<C>(tools, scene, on, next)));
                 column(&found, &here)
             };
-            let column = own.map_or_else(&mut by_sides, Ok)?;
+            let column = own.or_else(&mut by_sides).ok_or_else(singular)?;
             linear.scene.push(column);
         }
         Ok(linear)
     }
 
-    /// Columns of parameters by what they change themselves; none where that is not known.
+    /// Columns of parameters, and of the rotation of each hand, by what they change themselves; none where that is not known.
     fn local_columns(
         &self,
         tools: &mut Tools<C>,
         (around, next): (&Around<'_>, &Configuration),
         (at, entered): (&AtEnd<C>, &[(usize, Vec<Entered>)]),
         (wanted, scenes): (Wanted, &[Beside]),
-    ) -> Vec<Option<Column>> {
+    ) -> (Vec<Option<Column>>, Vec<Option<[Column; 2]>>) {
         let local = Local {
             around,
             at: next,
             pressing: &at.pressing,
             entered,
             numbers: &self.numbers,
-            reads: [wanted.energy, wanted.push],
+            reads: [wanted.energy, wanted.push != Push::Unread],
         };
-        let mut column = |beside: &Beside| {
-            let found = if at.lags { None } else { local.column(tools, beside) };
+        let hands = if wanted.hands { around.piece.hands.len() } else { 0 };
+        if at.lags {
+            return (vec![None; scenes.len()], vec![None; hands]);
+        }
+        let columns = scenes.iter().map(|beside| {
+            let found = local.column(tools, beside);
             found.map(|column| self.balanced(column))
-        };
-        scenes.iter().map(&mut column).collect()
+        });
+        let columns = columns.collect();
+        let turned = (0..hands).map(|instrument| {
+            let found = local.turned(tools, instrument);
+            found.map(|columns| columns.map(|column| self.balanced(column)))
+        });
+        (columns, turned.collect())
     }
 
     /// A column whose forces on what the mouth holds have become part of what is read there.
@@ -221,53 +245,8 @@ impl<const C: usize> Linear<C> {
         column
     }
 
-    /// Columns by one motion of a hand; none where it has none.
-    fn hand(
-        &self,
-        tools: &mut Tools<C>,
-        around: &Around<'_>,
-        (nominal, here): (&Scene, &Found),
-        (instrument, motion, stick_mm): (usize, usize, f64),
-        next: &mut Configuration,
-    ) -> Option<[Column; 2]> {
-        let (piece, environment) = (around.piece, &around.environment);
-        let parameter = [
-            Parameter::Advance { instrument },
-            Parameter::Rotation { instrument },
-            Parameter::Steering { instrument },
-        ][motion];
-        let device = &environment.surroundings.stack.instruments()[instrument].device;
-        if piece.hands[instrument].inserted_mm == 0.0 || (motion == 2 && !device.is_steerable()) {
-            return None;
-        }
-        let scale = own_scale(environment, &parameter).ok()?;
-        let radius_mm = if motion == 1 { device.section_at(f64::INFINITY).radius_mm } else { 1.0 };
-        let by = (STEP * scale).min(STICKING * stick_mm / radius_mm);
-        let start = piece.was.start();
-        let moved = |hands: &[Hand], by: f64| super::moved(&vec![(parameter, 1.0)], hands, by);
-        let before = [-by, by].map(|by| {
-            let mut there = piece.was.clone();
-            let (mesh, state) = there.parts();
-            state.hands = moved(&state.hands, by);
-            if motion == 0 {
-                meshed(environment, &state.hands, mesh);
-            }
-            if mesh.elements.len() != start.mesh.elements.len() || mesh.elements.is_empty() {
-                return (by, None);
-            }
-            state.rod.place(&mesh.elements);
-            (by, around.found::<C>(tools, nominal, (there.start(), &piece.hands), next))
-        });
-        let after = [-by, by].map(|by| {
-            let hands = moved(&piece.hands, by);
-            (by, around.found::<C>(tools, nominal, (start, &hands), next))
-        });
-        let before = if start.mesh.elements.is_empty() { None } else { column(&before, here).ok() };
-        Some([before.unwrap_or_default(), column(&after, here).ok()?])
-    }
-
     /// dx from the right-hand side, by K + U or its transpose.
-    fn solve(&self, right: &[f64], transposed: bool) -> Result<Vec<f64>> {
+    pub(super) fn solve(&self, right: &[f64], transposed: bool) -> Result<Vec<f64>> {
         let first = self.inverse.times(right);
         if self.lagging.is_empty() {
             return Ok(first);
@@ -289,11 +268,11 @@ impl<const C: usize> Linear<C> {
         if found { Ok(way) } else { Err(singular()) }
     }
 
-    /// What is remembered after the part, and its numbers, by changes of what is remembered before and along columns, each by so much.
+    /// What follows from changes of what is remembered before and along columns, each by so much.
     ///
     /// # Errors
     /// A singular equilibrium.
-    pub(super) fn forwards(&self, memory: &[f64], along: &[(&Column, f64)]) -> Result<(Vec<f64>, Vec<f64>)> {
+    pub(super) fn forwards(&self, memory: &[f64], along: &[(&Column, f64)]) -> Result<Went> {
         let mut forces = vec![0.0; self.after.rows + self.beyond];
         self.chain.add_times(memory, &mut forces);
         let slips = forces[forces.len() - self.places..].to_vec();
@@ -303,10 +282,10 @@ impl<const C: usize> Linear<C> {
         for (column, by) in along {
             right.iter_mut().zip(&column.right).for_each(|(right, own)| *right += by * own);
         }
-        let mut all = self.solve(&right, false)?;
-        let mut numbers = vec![0.0; self.numbers.len()];
-        let mut after = all.clone();
+        let way = self.solve(&right, false)?;
+        let mut all = way.clone();
         all.extend_from_slice(memory);
+        let (mut after, mut numbers) = (way.clone(), vec![0.0; self.numbers.len()]);
         self.reads.add_times(&all, &mut numbers);
         self.mouth.add_times(&forces, &mut numbers);
         for (column, by) in along {
@@ -314,7 +293,7 @@ impl<const C: usize> Linear<C> {
             numbers.iter_mut().zip(&column.numbers).for_each(|(to, own)| *to += by * own);
         }
         after.extend_from_slice(&numbers[..self.numbers.memory()]);
-        Ok((after, numbers))
+        Ok(Went { memory: after, numbers, way, forces })
     }
 
     /// The weights of what is remembered before, from those of what is remembered after, and of numbers. Calls `tell` for columns.
@@ -343,6 +322,30 @@ impl<const C: usize> Linear<C> {
         Ok((before, Weighted { forces, way: way.to_vec(), numbers }))
     }
 
+    /// Columns of parameters that change together, each by so much; the hands' shares before and after the part are of their command.
+    pub(super) fn columns(
+        &self,
+        together: &Together,
+        scenes: &[Beside],
+        shares: [f64; 2],
+    ) -> Vec<(&Column, f64)> {
+        let mut columns = Vec::new();
+        for (parameter, weight) in together {
+            match motion(parameter) {
+                Some((instrument, kind)) => {
+                    let own = self.hands[instrument][kind].iter().flatten();
+                    columns.extend(own.zip(shares).map(|(column, share)| (column, weight * share)));
+                }
+                None => {
+                    let own =
+                        scenes.iter().zip(&self.scene).filter(|(beside, _)| beside.parameter == *parameter);
+                    columns.extend(own.map(|(_, column)| (column, *weight)));
+                }
+            }
+        }
+        columns
+    }
+
     /// How much is remembered before.
     pub(super) fn remembers(&self) -> usize {
         self.before.len()
@@ -352,6 +355,17 @@ impl<const C: usize> Linear<C> {
     pub(super) fn leaves(&self) -> usize {
         self.after.len()
     }
+}
+
+/// Derivatives along one direction.
+pub(super) struct Went {
+    /// Of what is remembered after the part.
+    pub(super) memory: Vec<f64>,
+    pub(super) numbers: Vec<f64>,
+    /// dx, beside what moves along with the mouth.
+    pub(super) way: Vec<f64>,
+    /// Of the forces at the same x, and of those beyond the unknowns.
+    pub(super) forces: Vec<f64>,
 }
 
 /// Weights at a part, by which columns count.

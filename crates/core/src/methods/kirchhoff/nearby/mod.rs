@@ -9,8 +9,8 @@
 //!
 //! (P. Michaleris, D. A. Tortorelli, C. A. Vidal, *Tangent operators and design sensitivity formulations for transient non-linear
 //! coupled problems*, Int. J. Numer. Meth. Eng. 37 (1994)). So derivatives go from part to part as the device does, and friction,
-//! which slips from where the part began, remembers. Each parameter has two states, a little below and above; these are the only
-//! derivatives that are kept. The right-hand side is the difference of R, at the same x, between both sides.
+//! which slips from where the part began, remembers. Commands are recorded part by part (`recorded`, `reverse`), and each part is
+//! linearised once (`linear`), for derivatives in both directions.
 //!
 //! ∂R/∂x = K + U is more than Newton's matrix K: within a Newton step the normal forces of friction, the drag of blood and the forces
 //! between instruments are lagged. Here R contains them as they are at x ([`Search::assemble`](super::search::Search::assemble)). So
@@ -19,10 +19,8 @@
 //! (1 + K⁻¹U) dx/dp = K⁻¹b
 //! ```
 //!
-//! is solved by [`gmres`](crate::solve::gmres), where U v is a difference along v of what forces that follow have more than those that stay as they are at
-//! x. All else cancels in it to the last digits, which K⁻¹ would make a thousand times larger: the rod is that much stiffer along itself
-//! and against the wall than across. For the same reason it is the error of the motion that is made small, not that of the forces. Without
-//! lagged forces Newton's factors suffice.
+//! is solved by [`gmres`](crate::solve::gmres). It is the error of the motion that is made small, not that of the forces: the rod is a thousand
+//! times stiffer along itself and against the wall than across. Without lagged forces Newton's factors suffice.
 //!
 //! How far a device has spun in a part is measured by the smallest rotation of each of its triads from where the part began, also beside
 //! x: of triads that come from x by the smallest rotation it differs by half the product of both rotations, which is of first order in
@@ -37,38 +35,37 @@
 //!
 //! Several parameters that change together, each so much, are one p: dx/dp is then the product of the Jacobian with these changes.
 //!
-//! Commands that are recorded (`recorded`, `reverse`) are linearised part by part in `linear`, where derivatives go in both directions.
-//!
-//! Forces and energies are read out at both states, and differenced. A part that ended in a jump, or in which friction was
-//! anchored anew, has no derivative.
+//! A part that ended in a jump, or in which friction was anchored anew, has no derivative.
 
+mod chain;
 mod columns;
-mod command;
 mod forces;
+mod forward;
+mod hands;
+mod lagging;
 mod linear;
 mod numbers;
-mod read;
 mod readings;
 mod recorded;
 mod remembered;
 mod reverse;
+#[cfg(test)]
+mod solved;
 mod sparse;
-
-use std::sync::Arc;
+mod turned;
 
 use super::Environment;
 use super::carried::{Passage, taken_along};
-use super::configuration::{Configuration, Start};
+use super::configuration::Start;
 use super::hands::{Hand, steered};
 use super::part::{Effort, Found, Limits};
 use super::state::{KirchhoffState, UnderWay};
 use super::substep::{Attempt, Part};
-use super::workspace::Tools;
 use crate::device::Stack;
-use crate::methods::{Parameter, Parts, Slope, Surroundings, Together};
+use crate::methods::{Parameter, Parts, Surroundings, Together};
 use crate::solve::Neighbourhood;
 use crate::{Error, Result, Vec3};
-use forces::{go, longest_mm, rows, spins};
+pub(super) use recorded::Recorder;
 
 /// Change of a parameter to either side, as a fraction of its scale: differences then have as many digits from rounding as from
 /// curvature.
@@ -88,30 +85,6 @@ struct Scene {
     nodes: Option<Stack>,
 }
 
-/// The scene and the state where one parameter is a little less, or more.
-#[derive(Debug)]
-struct Side {
-    /// Change of the parameter.
-    by: f64,
-    scene: Scene,
-    at: Configuration,
-    /// At the end of the part that is followed.
-    next: Configuration,
-}
-
-/// The states beside a command.
-pub(super) struct Nearby {
-    parameters: Vec<Together>,
-    sides: Vec<[Side; 2]>,
-    /// Whether one side of a parameter has another mesh.
-    cut: Vec<bool>,
-    /// Hands at the start of the first command, and at its end; none in those that follow.
-    first: Option<[Vec<Hand>; 2]>,
-    /// Whether no part was followed yet.
-    begins: bool,
-    next: Configuration,
-}
-
 /// The end of a part, beside which others are sought.
 struct End<'a> {
     state: &'a KirchhoffState,
@@ -126,66 +99,6 @@ struct Acting<'a> {
     materials: Option<&'a Stack>,
     start: Start<'a>,
     attempt: Attempt<'a>,
-}
-
-impl Nearby {
-    /// Beside a command, the first one, from a state to those hands.
-    ///
-    /// # Errors
-    /// A parameter that does not exist there, or has no derivative.
-    pub(super) fn new(
-        environment: &Environment<'_>,
-        from: Start<'_>,
-        target: Vec<Hand>,
-        by: &[Together],
-    ) -> Result<Self> {
-        let at = || Configuration { mesh: from.mesh.clone(), state: Arc::new(from.state.clone()) };
-        let side = |together: &Together, by: f64| {
-            let scene = Scene::new(&environment.surroundings, together, by)?;
-            Ok::<Side, Error>(Side { by, scene, at: at(), next: at() })
-        };
-        let mut sides = Vec::with_capacity(by.len());
-        for together in by {
-            let step = STEP * scale(environment, together)?;
-            sides.push([side(together, -step)?, side(together, step)?]);
-        }
-        Ok(Self {
-            parameters: by.to_vec(),
-            sides,
-            cut: vec![false; by.len()],
-            first: Some([from.state.hands.clone(), target]),
-            begins: true,
-            next: at(),
-        })
-    }
-
-    /// Beside the next command.
-    pub(super) fn go_on(self) -> Self {
-        Self { first: None, ..self }
-    }
-
-    /// Derivatives at the end of the command.
-    pub(super) fn slopes(&self, end: &KirchhoffState) -> Vec<Slope> {
-        let all = self.sides.iter().zip(&self.cut);
-        all.map(|(sides, cut)| read::slope(sides, end, *cut)).collect()
-    }
-}
-
-/// What goes with the parts of a command.
-pub(super) trait Follows<const C: usize> {
-    /// Follows an accepted part from `was`, to `end`, with the passage of a moving vessel; in the last one of a command, in which
-    /// hands come to their target, forces and energies are read too.
-    ///
-    /// # Errors
-    /// [`Error::Computation`] where there is no derivative.
-    fn follow(
-        &mut self,
-        tools: &mut Tools<C>,
-        environment: &Environment<'_>,
-        on: (Start<'_>, Option<Passage<'_>>),
-        solved: (Attempt<'_>, &Found),
-        to: (&KirchhoffState, &[Hand]),
-    ) -> Result<()>;
 }
 
 /// Checks that a part has a derivative.
@@ -211,119 +124,6 @@ fn resumed(part: &Part<'_>, end: &KirchhoffState) -> UnderWay {
         neighbourhood: Neighbourhood::default(),
         shift: 0.0,
         iterations: 0,
-    }
-}
-
-impl<const C: usize> Follows<C> for Nearby {
-    fn follow(
-        &mut self,
-        tools: &mut Tools<C>,
-        environment: &Environment<'_>,
-        (was, passage): (Start<'_>, Option<Passage<'_>>),
-        (attempt, found): (Attempt<'_>, &Found),
-        (end, target): (&KirchhoffState, &[Hand]),
-    ) -> Result<()> {
-        check_smooth(&attempt, found)?;
-        let under_way = resumed(&attempt.part, end);
-        let part = Part { resumed: Some(&under_way), ..attempt.part };
-        let mut end = End { state: end, spins: Vec::new() };
-        let own = steered(environment.surroundings.stack, attempt.hands);
-        let nominal_start = taken_along(was, passage);
-        let nominal = Acting {
-            environment: environment.steered(&own),
-            materials: None,
-            start: nominal_start.as_ref().map_or(was, |state| Start { mesh: was.mesh, state }),
-            attempt: Attempt { part, left: passage.map(|passage| (was, passage)), ..attempt },
-        };
-        let is_last = attempt.hands == target && attempt.part.to == 1.0;
-        // Friction in the sheath's mouth follows from the force there in the part before.
-        let reads = is_last || environment.surroundings.sheath.friction > 0.0;
-        let progress =
-            self.first.as_ref().map_or(1.0, |first| progress(first, attempt.hands, attempt.part.to));
-        let Self { parameters, sides, cut, begins, next, .. } = self;
-        let assembled = tools.beside(&nominal, &end, next, |search, lagged, _| {
-            search.assemble(lagged, true);
-            let lags = search.lags(lagged);
-            let is_regular = search.newton.factor(search.elements, search.supports).is_some();
-            (rows(search), lags, is_regular)
-        });
-        let Some(((at_end, lags, true), slid)) = assembled else { return Err(singular()) };
-        end.spins = spins(&end.state.rod, &slid);
-        let most_mm = STICKING * tools.friction.stick_mm();
-        // Where all sides begin in the same state they may come nearer.
-        let begins = std::mem::take(begins);
-        for ((together, sides), cut) in parameters.iter().zip(sides).zip(cut) {
-            let mut may_come_nearer = begins;
-            let (hands, way) = loop {
-                let hands = [0, 1].map(|k| moved(together, attempt.hands, sides[k].by * progress));
-                let mut forces = [at_end.clone(), at_end.clone()];
-                for ((side, forces), hands) in sides.iter_mut().zip(&mut forces).zip(&hands) {
-                    let there = side.with(environment, (hands, passage), part, |beside, _| {
-                        tools.beside(beside, &end, next, |search, lagged, _| {
-                            search.assemble(lagged, false);
-                            rows(search)
-                        })
-                    });
-                    match there {
-                        Some((there, _)) => *forces = there,
-                        // The mesh there is another one.
-                        None => (side.by, *cut) = (0.0, true),
-                    }
-                    std::mem::swap(&mut side.next, next);
-                }
-                let between = sides[1].by - sides[0].by;
-                if between == 0.0 {
-                    let remedy = "the mesh changes on both sides: give a slightly other command";
-                    return Err(together[0].0.refused(remedy));
-                }
-                let right: Vec<f64> =
-                    forces[0].iter().zip(&forces[1]).map(|(less, more)| (less - more) / between).collect();
-                let way = tools.respond((&nominal, &end), (&right, lags, most_mm), next)?;
-                let by = most_mm / longest_mm::<C>(&way).max(f64::MIN_POSITIVE);
-                let is_near = sides.iter().all(|side| side.by.abs() <= by);
-                if is_near || !std::mem::take(&mut may_come_nearer) {
-                    break (hands, way);
-                }
-                for side in sides.iter_mut().filter(|side| side.by != 0.0) {
-                    side.by = by.copysign(side.by);
-                    side.scene = Scene::new(&environment.surroundings, together, side.by)?;
-                }
-            };
-            for (side, hands) in sides.iter_mut().zip(&hands) {
-                let by = side.by;
-                if by == 0.0 {
-                    tools.beside(&nominal, &end, next, |search, lagged, _| search.assemble(lagged, false));
-                    tools.finish(&nominal, (nominal.environment, reads), (&way, 0.0), next);
-                } else {
-                    std::mem::swap(&mut side.next, next);
-                    side.with(environment, (hands, passage), part, |beside, own| {
-                        if reads {
-                            tools.beside(beside, &end, next, |search, lagged, triads| {
-                                go(search, &search.state.clone(), (&way, by), triads);
-                                search.assemble(lagged, false);
-                            });
-                        }
-                        tools.finish(beside, (own, reads), (&way, by), next);
-                    });
-                }
-                std::mem::swap(&mut side.at, next);
-            }
-        }
-        tools.friction.set_coefficient(environment.surroundings.properties.largest_friction());
-        Ok(())
-    }
-}
-
-impl Side {
-    /// Calls `what` with this side in a part, and with the environment in which its forces are read.
-    fn with<T>(
-        &self,
-        environment: &Environment<'_>,
-        on: (&[Hand], Option<Passage<'_>>),
-        part: Part<'_>,
-        what: impl FnOnce(&Acting<'_>, Environment<'_>) -> T,
-    ) -> T {
-        self.scene.with(environment, (self.at.start(), on), part, what)
     }
 }
 

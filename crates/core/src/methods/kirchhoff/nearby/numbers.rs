@@ -11,10 +11,21 @@ use super::{End, Scene};
 use crate::methods::kirchhoff::Environment;
 use crate::rod::Clamp;
 
+/// How push forces are read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum Push {
+    #[default]
+    Unread,
+    /// By each unknown.
+    Rows,
+    /// Those of several instruments, which depend on all of the line, along each direction; of one by each unknown.
+    Along,
+}
+
 /// What is read, beside places: what costs more.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Wanted {
-    pub(super) push: bool,
+    pub(super) push: Push,
     pub(super) energy: bool,
     /// Motions of the hands.
     pub(super) hands: bool,

@@ -4,16 +4,22 @@ use super::super::configuration::{Configuration, Start};
 use super::super::hands::Hand;
 use super::super::tail::TWIST;
 use super::super::workspace::Tools;
-use super::forces::go;
-use super::linear::{AtEnd, Linear};
+use super::chain::WRENCH;
+use super::forces::{go, longest_mm};
+use super::linear::{AtEnd, Linear, Went};
 use super::numbers::{Around, mouth_of_one, tail_numbers};
-use super::remembered::{TAIL_STEP, WRENCH};
+use super::recorded::Piece;
+use super::remembered::TAIL_STEP;
 use super::sparse::Row;
-use super::{STICKING, Scene};
+use super::{End, STICKING, Scene};
+use crate::Result;
 use crate::contact::PressingSlopes;
+use crate::methods::kirchhoff::Environment;
 use crate::rod::Layout;
 use crate::rod::scatter::point_columns;
 
+/// Longest motion of a node in differences along a direction, mm: push forces of several instruments are differences themselves.
+const ALONG_MM: f64 = 1e-4;
 /// Step of differences in unknowns of the rod.
 const UNKNOWN_STEP: f64 = 3e-6;
 
@@ -226,6 +232,54 @@ impl<const C: usize> Linear<C> {
                 }
             }
         });
+    }
+
+    /// Adds to the numbers along a direction the push forces of several instruments: the difference of both sides of it.
+    ///
+    /// # Errors
+    /// A parameter of the scene that does not exist.
+    pub(super) fn read_forces_along(
+        &self,
+        tools: &mut Tools<C>,
+        (environment, piece): (Environment<'_>, &Piece),
+        went: &mut Went,
+        next: &mut Configuration,
+    ) -> Result<()> {
+        let nominal = Scene::new(&environment.surroundings, &Vec::new(), 0.0)?;
+        let end = End { state: piece.end(), spins: self.spins.clone() };
+        let touches = self.numbers.touches.clone();
+        let around =
+            Around { environment: piece.environment(&environment), piece, end, reads: true, touches };
+        let Went { way, forces, .. } = &*went;
+        let longest_mm = longest_mm::<C>(way);
+        let far = forces.iter().fold(longest_mm, |most, force| most.max(force.abs()));
+        let by = ALONG_MM.min(STICKING * tools.friction.stick_mm()) / far.max(f64::MIN_POSITIVE);
+        let on = (piece.was.start(), &piece.hands[..]);
+        let sides = around.piece.with(&around.environment, &nominal, on, |acting, own| {
+            [-by, by].map(|by| {
+                tools.beside(acting, &around.end, next, |search, lagged, triads| {
+                    go(search, &search.state.clone(), (way, by), triads);
+                    search.assemble(lagged, false);
+                });
+                self.held.iter().for_each(|row| tools.newton.start_residual[*row] += by * forces[*row]);
+                let (rubs, slips) = forces[self.after.rows..].split_at(WRENCH * self.rubbing.len());
+                for (index, wrench) in self.rubbing.iter().zip(rubs.chunks_exact(WRENCH)) {
+                    let Ok(k) = around.touches.binary_search(index) else { continue };
+                    let Some((_, touch)) = next.parts().1.touches.get_mut(k) else { continue };
+                    (0..3).for_each(|axis| touch.contact.friction_n[axis] -= by * wrench[axis]);
+                    touch.friction_nmm -= by * wrench[3];
+                }
+                for (k, slip) in slips.iter().enumerate() {
+                    tools.friction.between.slip_from(k, by * slip);
+                }
+                around.numbers(tools, &own, next)
+            })
+        });
+        for k in 0..self.numbers.instruments {
+            let push = self.numbers.push(k);
+            went.numbers[push] += (sides[1][push] - sides[0][push]) / (2.0 * by);
+        }
+        Ok(())
     }
 
     /// Places of nodes.

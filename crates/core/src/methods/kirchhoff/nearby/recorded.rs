@@ -8,8 +8,7 @@ use super::super::hands::Hand;
 use super::super::part::Found;
 use super::super::state::{KirchhoffState, UnderWay};
 use super::super::substep::{Attempt, Part};
-use super::super::workspace::Tools;
-use super::{Acting, Follows, Scene, check_smooth, progress, resumed};
+use super::{Acting, Scene, check_smooth, progress, resumed};
 use crate::Result;
 use crate::methods::kirchhoff::Environment;
 use crate::vessel::Displacement;
@@ -57,7 +56,7 @@ impl Piece {
 }
 
 /// Records the parts of a command.
-pub(super) struct Recorder {
+pub(in super::super) struct Recorder {
     /// Hands at its start and at its end.
     way: [Vec<Hand>; 2],
     come: f64,
@@ -69,12 +68,13 @@ impl Recorder {
     pub(super) fn new(way: [Vec<Hand>; 2]) -> Self {
         Self { way, come: 0.0, pieces: Vec::new() }
     }
-}
 
-impl<const C: usize> Follows<C> for Recorder {
-    fn follow(
+    /// Records an accepted part from `was`, to `end`, with the passage of a moving vessel; `target` is where the hands of the command go.
+    ///
+    /// # Errors
+    /// [`Error::Computation`](crate::Error) where there is no derivative.
+    pub(in super::super) fn follow(
         &mut self,
-        _tools: &mut Tools<C>,
         environment: &Environment<'_>,
         (was, passage): (Start<'_>, Option<Passage<'_>>),
         (attempt, found): (Attempt<'_>, &Found),

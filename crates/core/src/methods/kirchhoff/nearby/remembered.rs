@@ -17,7 +17,7 @@
 //! dφ = dθ + c·dt − dθ′ + c·dt′
 //! ```
 //!
-//! Sums along the rod are the only long ones; with them as intermediates all is sparse ([`Chain`]), in both directions.
+//! Sums along the rod are the only long ones; with them as intermediates all is sparse ([`Chain`]).
 
 use nalgebra::Matrix3;
 
@@ -25,6 +25,7 @@ use super::super::configuration::Start;
 use super::super::mesh::Mesh;
 use super::super::tail::TWIST;
 use super::super::tails::Tails;
+use super::chain::{Chain, Memory, WRENCH};
 use super::sparse::{Row, Sparse};
 use crate::Vec3;
 use crate::contact::{CarriedSlopes, FrictionSlopes, HandMotion, Place, PressingSlopes};
@@ -37,96 +38,9 @@ use crate::rod::{Frame, Layout, RodState};
 /// Step of differences in the numbers of a tail's twist.
 pub(super) const TAIL_STEP: f64 = 1e-6;
 
-/// Numbers of a force and a moment about the device.
-pub(super) const WRENCH: usize = 4;
-
-/// Where the numbers are that are remembered of a state with so many rows and instruments.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Memory {
-    pub(super) rows: usize,
-    pub(super) instruments: usize,
-}
-
-impl Memory {
-    /// Of a number of a tail's twist.
-    pub(super) fn twist(self, instrument: usize, number: usize) -> usize {
-        self.rows + TWIST * instrument + number
-    }
-
-    /// Of the force across at the mouth.
-    pub(super) fn across(self) -> usize {
-        self.rows + TWIST * self.instruments
-    }
-
-    pub(super) fn len(self) -> usize {
-        self.across() + 1
-    }
-}
-
-/// Derivatives of forces in what is remembered, with sums along the rod before and the slid one as intermediates.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Chain {
-    memory: usize,
-    /// Numbers of elements before and after.
-    elements: [usize; 2],
-    /// dψ of each element before and of each slid one, in what is remembered.
-    turns: Sparse,
-    /// Of the forces, in what is remembered and the sums.
-    rows: Sparse,
-}
-
-impl Chain {
-    /// Adds the change of the forces with what is remembered.
-    pub(super) fn add_times(&self, memory: &[f64], to: &mut [f64]) {
-        let [before, after] = self.elements;
-        let mut turns = vec![0.0; before + after];
-        self.turns.add_times(memory, &mut turns);
-        let mut all = memory.to_vec();
-        for part in [&turns[..before], &turns[before..]] {
-            let mut sum = 0.0;
-            all.push(sum);
-            for turn in part {
-                sum += turn;
-                all.push(sum);
-            }
-        }
-        self.rows.add_times(&all, to);
-    }
-
-    /// Adds the product of the transpose: of the forces' weights to those of what is remembered.
-    pub(super) fn add_transposed_times(&self, weights: &[f64], to: &mut [f64]) {
-        let [before, after] = self.elements;
-        let mut all = vec![0.0; self.memory + before + after + 2];
-        self.rows.add_transposed_times(weights, &mut all);
-        let mut turns = Vec::with_capacity(before + after);
-        let mut from = self.memory;
-        for count in [before, after] {
-            let sums = &all[from + 1..from + 1 + count];
-            let mut ahead: Vec<f64> = sums
-                .iter()
-                .rev()
-                .scan(0.0, |sum, weight| {
-                    *sum += weight;
-                    Some(*sum)
-                })
-                .collect();
-            ahead.reverse();
-            turns.extend(ahead);
-            from += count + 1;
-        }
-        to.iter_mut().zip(&all).for_each(|(to, own)| *to += own);
-        self.turns.add_transposed_times(&turns, to);
-    }
-
-    /// Adds the derivative of a force in a number that is remembered.
-    pub(super) fn add_force(&mut self, row: usize, column: usize, value: f64) {
-        self.rows.add(row, column, value);
-    }
-}
-
 /// Where a force and a moment at a point act on the rod.
 pub(super) struct Scatter {
-    columns: [(usize, Vec3); 10],
+    pub(super) columns: [(usize, Vec3); 10],
     /// None without angles.
     turning: Option<[(usize, f64); 3]>,
 }
@@ -481,33 +395,5 @@ impl Between<'_> {
             rows.add(first + 3, same[0].0, moment);
             scatter.add((force, moment), |row, own| rows.add(row, same[0].0, own));
         }
-    }
-
-    /// Of the forces beyond those in Newton's matrix: of friction and of the wall that follow from the place of a point, and of friction
-    /// by the spin of the device as it is measured from the slid one.
-    pub(super) fn lagging<const C: usize>(&self, pressing: &[PressingSlopes]) -> Sparse {
-        let l = Layout::<C>;
-        let mut lagging = Sparse::default();
-        for at in pressing {
-            let (e, xi, _) = self.mesh.points[at.index].place();
-            let scatter = Scatter::at::<C>(self.rod, self.mesh, at.index);
-            let mut add = |column: usize, force: Vec3, moment: f64| {
-                scatter.add((force, moment), |row, own| lagging.add(row, column, own));
-            };
-            for (column, way) in &scatter.columns {
-                add(*column, at.lagging.0 * way, at.lagging.1.dot(way));
-            }
-            let Some(friction) = at.friction.filter(|_| !self.slid.is_empty()) else { continue };
-            let [w0, w1, _] = Point::at(xi, 0.0).phi;
-            for (node, weight) in [(e, w0), (e + 1, w1)] {
-                let frame = &self.rod.frames[node];
-                let by = twisting(&self.slid[node].t, &frame.t) * weight;
-                for (axis, way) in [frame.u, frame.v].iter().enumerate() {
-                    let spin = by.dot(way);
-                    add(l.tangent(node) + axis, friction.by_spin.0 * spin, friction.by_spin.1 * spin);
-                }
-            }
-        }
-        lagging
     }
 }

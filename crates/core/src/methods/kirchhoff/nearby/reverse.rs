@@ -6,46 +6,77 @@
 use std::sync::Arc;
 
 use super::super::command::Driven;
-use super::super::configuration::Configuration;
+use super::super::configuration::{Configuration, Start};
 use super::super::hands::{Hand, lengths};
 use super::super::workspace::Workspace;
 use super::super::{Environment, Kirchhoff, KirchhoffOptions, write_line};
 use super::columns::Beside;
 use super::linear::Linear;
-use super::numbers::{Numbers, Wanted};
-use super::read::margin;
+use super::numbers::{Numbers, Push, Wanted};
 use super::recorded::{Piece, Recorder};
 use super::{STEP, Scene, scale};
 use crate::contact::ContactSurface;
 use crate::methods::{
-    Command, Move, Parameter, Passed, Pulled, StepReport, Surroundings, Tape, Timed, Weights,
+    Command, Margin, Move, Parameter, Passed, Pulled, Slope, StepReport, Surroundings, Tape, Timed, Together,
+    Weights,
 };
 use crate::shape::Shape;
 use crate::{Error, Result};
+
+/// How far the next change of a contact is.
+fn margin(end: Start<'_>) -> Margin {
+    let Start { mesh, state } = end;
+    let forces = state.touches.iter().map(|(_, touch)| touch.contact.force_n);
+    let radii_mm = mesh.points.iter().map(|point| point.potential.radius_mm);
+    Margin {
+        least_force_n: forces.fold(f64::INFINITY, f64::min),
+        least_gap_mm: state.known.gaps_mm(radii_mm).fold(f64::INFINITY, f64::min),
+    }
+}
 
 /// Parts that are kept, each some tenths of a megabyte: the bound of memory is about a hundred megabytes.
 const MOST_KEPT: usize = 256;
 
 /// A command that was carried out.
-struct Recorded {
+pub(super) struct Recorded {
     moves: Vec<Move>,
     time_s: [f64; 2],
-    from: Configuration,
+    pub(super) from: Configuration,
     way: [Vec<Hand>; 2],
     /// None once dropped; empty where nothing moved.
-    pieces: Option<Vec<Piece>>,
-    is_first: bool,
+    pub(super) pieces: Option<Vec<Piece>>,
+    pub(super) is_first: bool,
 }
 
 /// Commands that were carried out.
 pub(super) struct Record<const C: usize> {
-    options: KirchhoffOptions,
-    surface: Arc<ContactSurface>,
-    commands: Vec<Recorded>,
-    passed: Vec<Passed>,
+    pub(super) options: KirchhoffOptions,
+    pub(super) surface: Arc<ContactSurface>,
+    pub(super) commands: Vec<Recorded>,
+    pub(super) passed: Vec<Passed>,
 }
 
 impl<const C: usize> Kirchhoff<C> {
+    /// Checks that commands from here have derivatives.
+    ///
+    /// # Errors
+    /// A vessel that yields, loops that touch, detached coils, and earlier commands that are not done.
+    fn check_differentiable(&self, surroundings: &Surroundings<'_>) -> Result<()> {
+        if surroundings.course.is_some() {
+            let remedy = "derivatives of a vessel that yields are not there: leave it out";
+            return Err(Error::parameter("vessel.yielding", "given", remedy));
+        }
+        if self.options.self_contact || !self.state.coils.is_empty() {
+            let remedy = "gradients know no contact between loops, and no coils: set it to false";
+            return Err(Error::parameter("method.self_contact", self.options.self_contact, remedy));
+        }
+        if self.state.unfinished.is_some() {
+            let remedy = "earlier commands are not done: finish them, or drop them with forget";
+            return Err(Error::parameter("gradient", "behind", remedy));
+        }
+        Ok(())
+    }
+
     /// Carries out commands on a copy, and records them.
     ///
     /// # Errors
@@ -125,7 +156,7 @@ impl Recorded {
         let mut recorder = Recorder::new(self.way.clone());
         let on = (&self.moves[..], usize::MAX);
         let Driven::Moved(took) =
-            workspace.carry_out_beside(environment, &self.from.state, on, Some(&mut recorder))?
+            workspace.carry_out_recorded(environment, &self.from.state, on, Some(&mut recorder))?
         else {
             return Err(Error::Computation("gradient: the command has no end".to_owned()));
         };
@@ -157,14 +188,14 @@ impl<const C: usize> Record<C> {
     }
 
     /// The surroundings of a command, from those of the first.
-    fn surroundings<'a>(&self, first: &Surroundings<'a>, command: &Recorded) -> Surroundings<'a> {
+    pub(super) fn surroundings<'a>(&self, first: &Surroundings<'a>, command: &Recorded) -> Surroundings<'a> {
         let [before, after] = first.fields;
         let fields = if command.is_first { [before, after] } else { [after, after] };
         Surroundings { time_s: command.time_s, fields, ..*first }
     }
 
     /// Scenes beside that of the commands, in which one parameter is a little less and more; none for those of the first command.
-    fn scenes(&self, surroundings: &Surroundings<'_>, by: &[Parameter]) -> Result<Vec<Beside>> {
+    pub(super) fn scenes(&self, surroundings: &Surroundings<'_>, by: &[Parameter]) -> Result<Vec<Beside>> {
         let environment = Environment::new(surroundings, &self.surface, &self.options);
         let mut scenes = Vec::new();
         for parameter in by {
@@ -179,7 +210,7 @@ impl<const C: usize> Record<C> {
     }
 
     /// Calls `walk` with the parts of a command, which are carried out again if they were dropped.
-    fn with_pieces<T>(
+    pub(super) fn with_pieces<T>(
         &self,
         workspace: &mut Workspace<C>,
         (command, environment): (&Recorded, &Environment<'_>),
@@ -197,7 +228,7 @@ impl<const C: usize> Record<C> {
 }
 
 /// Instrument and kind of a motion of the hand.
-fn motion(parameter: &Parameter) -> Option<(usize, usize)> {
+pub(super) fn motion(parameter: &Parameter) -> Option<(usize, usize)> {
     match *parameter {
         Parameter::Advance { instrument } => Some((instrument, 0)),
         Parameter::Rotation { instrument } => Some((instrument, 1)),
@@ -232,7 +263,8 @@ impl Weights {
     /// What of it costs more.
     fn wanted(&self) -> Wanted {
         let any = |list: &[f64]| list.iter().any(|weight| *weight != 0.0);
-        Wanted { push: any(&self.push_force_n), energy: self.energy_mj != 0.0, hands: false }
+        let push = if any(&self.push_force_n) { Push::Rows } else { Push::Unread };
+        Wanted { push, energy: self.energy_mj != 0.0, hands: false }
     }
 }
 
@@ -269,7 +301,7 @@ impl<const C: usize> Tape for Record<C> {
             }
             let own = std::mem::take(&mut waiting);
             let wanted = own.iter().map(|one| one.wanted()).fold(Wanted::default(), |a, b| Wanted {
-                push: a.push || b.push,
+                push: if a.push == Push::Unread { b.push } else { a.push },
                 energy: a.energy || b.energy,
                 hands: wants_hands,
             });
@@ -323,63 +355,12 @@ impl<const C: usize> Tape for Record<C> {
         Ok(Pulled { by, one_sided: sided, hands })
     }
 
-    fn push(&self, first: &Surroundings<'_>, along: &[(Parameter, f64)]) -> Result<Vec<Weights>> {
-        let by: Vec<Parameter> = along.iter().map(|(parameter, _)| *parameter).collect();
-        let scenes = self.scenes(first, &by)?;
-        let environment = Environment::new(first, &self.surface, &self.options);
-        let mut workspace = Workspace::<C>::new(&environment, &self.commands[0].from.state);
-        let mut next = self.commands[0].from.clone();
-        let mut memory: Vec<f64> = Vec::new();
-        let mut all: Vec<Weights> = Vec::with_capacity(self.commands.len());
-        let wanted = Wanted { push: true, energy: true, hands: by.iter().any(|one| motion(one).is_some()) };
-        for command in &self.commands {
-            if command.pieces.as_ref().is_some_and(Vec::is_empty) {
-                all.extend(all.last().cloned());
-                continue;
-            }
-            let surroundings = self.surroundings(first, command);
-            let environment = Environment::new(&surroundings, &self.surface, &self.options);
-            self.with_pieces(&mut workspace, (command, &environment), |workspace, pieces| {
-                for piece in pieces {
-                    let on = (environment, piece);
-                    let linear = Linear::<C>::new(&mut workspace.tools, on, (wanted, &scenes), &mut next)?;
-                    memory.resize(linear.remembers(), 0.0);
-                    let shares = if command.is_first { piece.shares } else { [1.0; 2] };
-                    let mut columns = Vec::new();
-                    let mut scene = linear.scene.iter();
-                    for (parameter, weight) in along {
-                        match motion(parameter) {
-                            Some((instrument, kind)) => {
-                                let own = linear.hands[instrument][kind].iter().flatten();
-                                columns
-                                    .extend(own.zip(shares).map(|(column, share)| (column, weight * share)));
-                            }
-                            None => columns.extend(scene.next().map(|column| (column, *weight))),
-                        }
-                    }
-                    let (after, numbers) = linear.forwards(&memory, &columns)?;
-                    memory = after;
-                    if piece.is_last {
-                        all.push(read(&numbers, &linear.numbers));
-                    }
-                }
-                Ok(())
-            })?;
-        }
-        Ok(all)
+    fn push(&self, first: &Surroundings<'_>, along: &[Together]) -> Result<Vec<Vec<Slope>>> {
+        self.pushed(first, along)
     }
-}
 
-/// Changes of what is read, as they are weighted.
-fn read(values: &[f64], numbers: &Numbers) -> Weights {
-    let list = |first: usize, count: usize| values[first..first + count].to_vec();
-    let place = |node: usize| crate::Vec3::from_column_slice(&values[numbers.place(node)..][..3]);
-    Weights {
-        tip_mm: place(numbers.nodes - 1),
-        positions_mm: (0..numbers.nodes).map(place).collect(),
-        push_force_n: list(numbers.push(0), numbers.instruments),
-        torque_nmm: list(numbers.torque(0), numbers.instruments),
-        energy_mj: values[numbers.energy()],
-        contact_forces_n: list(numbers.contact(0), numbers.touches.len()),
+    #[cfg(test)]
+    fn solved(&self, first: &Surroundings<'_>, by: (Parameter, f64)) -> Result<Vec<Vec<f64>>> {
+        self.solved_beside(first, by)
     }
 }
