@@ -32,6 +32,8 @@ impl<const C: usize> Record<C> {
         let mut workspace = Workspace::<C>::new(&environment, &self.commands[0].from.state);
         let mut next = self.commands[0].from.clone();
         let mut memories: Vec<Vec<f64>> = vec![Vec::new(); along.len()];
+        // A part that has a derivative on one side only leaves none on both sides of all that follows.
+        let mut cut = vec![false; along.len()];
         let mut all: Vec<Vec<Slope>> = Vec::with_capacity(self.commands.len());
         let hands = by.iter().any(|one| motion(one).is_some());
         let wanted = Wanted { push: Push::Along, energy: true, hands };
@@ -48,20 +50,22 @@ impl<const C: usize> Record<C> {
                     let linear = Linear::<C>::new(&mut workspace.tools, on, (wanted, &scenes), &mut next)?;
                     let shares = if command.is_first { piece.shares } else { [1.0; 2] };
                     let mut slopes = Vec::with_capacity(along.len());
-                    for ((together, step), memory) in along.iter().zip(&steps).zip(&mut memories) {
+                    for (((together, step), memory), cut) in
+                        along.iter().zip(&steps).zip(&mut memories).zip(&mut cut)
+                    {
                         memory.resize(linear.remembers(), 0.0);
                         let columns = linear.columns(together, &scenes, shares);
                         let mut went = linear.forwards(memory, &columns)?;
                         *memory = std::mem::take(&mut went.memory);
+                        *cut |= columns.iter().any(|(column, _)| column.one_sided);
                         if linear.pushes_along {
                             linear.read_forces_along(&mut workspace.tools, on, &mut went, &mut next)?;
                         }
                         if piece.is_last {
-                            let cut = columns.iter().any(|(column, _)| column.one_sided);
                             slopes.push(slope(
                                 (&went.numbers, &linear.numbers),
                                 (piece, passed),
-                                (*step, cut),
+                                (*step, *cut),
                             ));
                         }
                     }
