@@ -182,7 +182,7 @@ fn who_stops_on_the_way_gets_the_part_of_it_that_was_covered() {
     near(
         until(80, &|record| {
             fast(record);
-            record.beam = Some(vec![])
+            record.beam = Some(vec![]);
         }),
         0.0,
     );
