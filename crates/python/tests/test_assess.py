@@ -43,7 +43,8 @@ def test_a_run_is_scored_by_a_subject(tmp_path):
     arch = assets / "vessels" / "aortic_arch.csv"
     score = endowire.score(tmp_path, subject)
     assert score == endowire.score(tmp_path, subject, centreline=arch)
-    assert (score["subject"], score["passed"], score["score"]) == ("left_carotid", False, 0.0)
+    assert (score["subject"], score["passed"]) == ("left_carotid", False)
+    assert 0.0 < score["score"] < 5.0, "a part of the way, of the least score of its band"
     assert score["ended"] == {"by": "wall_force", "time_s": 2.0}
     metrics = {metric["name"]: metric for metric in score["metrics"]}
     assert metrics["total_s"]["passed"] is True and metrics["total_s"]["threshold"]["at_most"] == 240.0
@@ -94,7 +95,7 @@ def test_a_course_of_attempts(tmp_path):
     assets = endowire.assets_path()
     task = {"subject": assets / "subjects" / "left_carotid.toml"}
     scored = endowire.course(folders[:2], **task)
-    assert scored["passed"] == [False, False] and scored["score"]["values"] == [0.0, 0.0]
+    assert scored["passed"] == [False, False] and all(0.0 < score < 5.0 for score in scored["score"]["values"])
     with pytest.raises(endowire.InputError, match="target"):
         endowire.course(folders, target="left carotid", **task)
     with pytest.raises(endowire.InputError, match=r"paths\[2\] = .*: is paths\[0\] again"):

@@ -206,8 +206,9 @@ fn a_rough_region_holds_a_device_that_is_turned_on_it() {
 /// place has the modulus of the clot.
 fn sunk_mm(soft_at: [f64; 3]) -> f64 {
     const DEPTH_MM: f64 = 0.02;
-    let setup = WallRodSpec { length: 40.0, bending: 160.0, radius: 0.45, elements: 80, modulus: 100.0 };
+    let setup = WallRodSpec { length: 40.0, bending: 0.16, radius: 0.45, elements: 80, modulus: 100.0 };
     // The clot's top is flat below the whole rod, which begins at the depth that 0.02 N/mm gives at 1 N/mm².
+    // Read in the middle of a rod so soft that its ends are not felt there.
     let top = DEPTH_MM - setup.radius;
     let mut surface = SurfaceMesh::cuboid(Vec3::new(-30.0, -20.0, -20.0), Vec3::new(70.0, 20.0, 20.0), 2.0);
     let clot = SurfaceMesh::cuboid(Vec3::new(-12.0, top - 8.0, -12.0), Vec3::new(52.0, top, 12.0), 1.0);
@@ -223,7 +224,7 @@ fn sunk_mm(soft_at: [f64; 3]) -> f64 {
     let mut rod = WallRod::on_wall(&walls, &properties, &setup, Vec3::zeros(), |_| straight).unwrap();
     rod.loads.distributed = vec![(0, setup.elements, Vec3::y() * -DEPTH_MM)];
     rod.solve().unwrap();
-    DEPTH_MM - rod.state.positions[setup.elements * 3 / 4].y
+    DEPTH_MM - rod.state.positions[setup.elements / 2].y
 }
 
 #[test]
