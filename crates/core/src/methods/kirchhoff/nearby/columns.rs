@@ -41,6 +41,9 @@ use crate::rod::element::ElementSystem;
 use crate::rod::{Assembly, ElementData, Layout, element_energy, element_gradients, element_system};
 use crate::solve::External;
 
+/// Begins the tails on one of two sides.
+pub(super) type Begin<'a> = dyn Fn(&mut Tails, usize) + 'a;
+
 /// Derivatives in one number, at the same end.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Column {
@@ -247,7 +250,7 @@ impl Local<'_> {
     pub(super) fn add_twists<const C: usize>(
         &self,
         tools: &mut Tools<C>,
-        (stacks, begin): ([&Stack; 2], &dyn Fn(&mut Tails, usize)),
+        (stacks, begin): ([&Stack; 2], &Begin<'_>),
         between: f64,
         to: &mut Column,
     ) {

@@ -168,8 +168,7 @@ impl<const C: usize> Linear<C> {
             (linear.lagging, linear.slipping) = (lagging, slipping);
         }
         add_moments::<C>(&next.mesh, &at.pressing, &mut linear.lagging);
-        let alone = piece.hands.len() == 1 && !at.lags;
-        if reads_mouth && alone {
+        if reads_mouth && piece.hands.len() == 1 && !at.lags {
             linear.read_mouth(tools, &around, (&nominal, on), (&at.pressing, &at.at_mouth), next);
         } else if reads_mouth {
             linear.read_forces(tools, &around, (&nominal, on), &at, next);

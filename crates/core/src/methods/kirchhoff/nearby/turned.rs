@@ -2,7 +2,7 @@
 
 use super::super::tails::Tails;
 use super::super::workspace::Tools;
-use super::columns::{Column, Local};
+use super::columns::{Begin, Column, Local};
 use super::{STEP, moved};
 use crate::contact::stick_mm;
 use crate::methods::Parameter;
@@ -35,7 +35,7 @@ impl Local<'_> {
             |tails: &mut Tails, side: usize| tails.begin(environment, (&before[side], &piece.hands));
         let begin_after =
             |tails: &mut Tails, side: usize| tails.begin(environment, (&piece.was.state, &hands[side]));
-        let sides: [(&dyn Fn(&mut Tails, usize), f64); 2] = [(&begin_before, -1.0), (&begin_after, 1.0)];
+        let sides: [(&Begin<'_>, f64); 2] = [(&begin_before, -1.0), (&begin_after, 1.0)];
         Some(sides.map(|(begin, sign)| {
             let mut to = self.nothing::<C>();
             if sign < 0.0 && piece.was.mesh.elements.is_empty() {
