@@ -1,5 +1,7 @@
 //! Stiffness and friction of a vessel's wall, uniform or by region.
 
+use std::cell::OnceCell;
+
 use serde::{Deserialize, Serialize};
 
 use crate::error::{in_range, number, vector};
@@ -107,11 +109,12 @@ impl WallRegion {
     }
 
     /// For each vertex of a wall, 1 inside the region, 0 outside, and between these at its edge.
-    fn shares(&self, query: &WallQuery, pieces: &Pieces) -> Vec<f64> {
+    fn shares(&self, query: &WallQuery, pieces: &OnceCell<Pieces>) -> Vec<f64> {
         let mesh = query.mesh();
         match self.place() {
             Some(Place::Sphere(sphere)) => mesh.vertices_mm.iter().map(|x| sphere.share(x)).collect(),
             Some(Place::Piece(at)) => {
+                let pieces = pieces.get_or_init(|| Pieces::of(mesh));
                 let piece = pieces.at(query, &at).map_or(u32::MAX, |(piece, _)| piece);
                 pieces.vertices_of(piece, mesh).into_iter().map(|of| f64::from(u8::from(of))).collect()
             }
@@ -138,7 +141,8 @@ impl WallProperties {
     /// the first ten-thousandth of it, and the range in which a Newton step is reliable, k/|∇k|, would be smallest
     /// where the wall is softest.
     pub(crate) fn at_vertices(&self, query: &WallQuery) -> Vec<(f64, f64)> {
-        let pieces = Pieces::of(query.mesh());
+        // Counted only where a region is a piece.
+        let pieces = OnceCell::new();
         let mut values = vec![(0.0, self.friction); query.mesh().vertices_mm.len()];
         let blended =
             |was: f64, own: f64, share: f64| if share == 1.0 { own } else { was + (own - was) * share };

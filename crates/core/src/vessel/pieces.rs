@@ -87,14 +87,13 @@ impl Pieces {
 mod tests {
     use super::*;
     use crate::vessel::Wall;
+    use crate::vessel::repair::shapes::add;
 
     /// A box with a cube by its floor: the middle of the cube is nearer to the floor than to its own surface.
     fn with_cube() -> Wall {
         let mut mesh = SurfaceMesh::cuboid(Vec3::zeros(), Vec3::new(10.0, 10.0, 40.0), 2.0);
         let cube = SurfaceMesh::cuboid(Vec3::new(3.0, 0.1, 20.0), Vec3::new(7.0, 4.1, 24.0), 1.0);
-        let first = mesh.vertices_mm.len() as u32;
-        mesh.vertices_mm.extend(cube.vertices_mm);
-        mesh.triangles.extend(cube.triangles.into_iter().map(|triangle| triangle.map(|v| v + first)));
+        add(&mut mesh, &cube);
         Wall::from_surface(&mesh).unwrap()
     }
 

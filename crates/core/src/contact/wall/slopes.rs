@@ -126,7 +126,7 @@ impl WallContact<'_> {
             (by_place.0, by_place.1) = (by_place.0 + f.hessian + force, f.mixed + moment);
             rubs = (f.gradient, f.turn);
             let by_stick = self.friction.law.by_stick(slider, (&x, angle));
-            Some(FrictionSlopes { by_stick, ..slider_slopes(slider, &f.hessian, &f.gradient, angle) })
+            Some(slider_slopes(slider, (&f.hessian, &f.gradient), by_stick, angle))
         });
         let at = self.pressing_at(index, d);
         let acts = PointForces {
@@ -209,8 +209,13 @@ impl WallContact<'_> {
     }
 }
 
-/// Derivatives of the friction of a slider with this force and its Jacobian.
-fn slider_slopes(slider: &Slider, hessian: &Matrix3<f64>, force: &Vec3, angle: f64) -> FrictionSlopes {
+/// Derivatives of the friction of a slider with this force, its Jacobian, and these in the slip within which it sticks.
+fn slider_slopes(
+    slider: &Slider,
+    (hessian, force): (&Matrix3<f64>, &Vec3),
+    by_stick: (Vec3, f64),
+    angle: f64,
+) -> FrictionSlopes {
     let turn = slider.normal.cross_matrix() * slider.radius_mm;
     let spin = turn * slider.along;
     let (mixed, spun_rad) = (hessian * spin, angle - slider.from_rad);
@@ -218,6 +223,6 @@ fn slider_slopes(slider: &Slider, hessian: &Matrix3<f64>, force: &Vec3, angle: f
         by_spin: (mixed, mixed.dot(&spin)),
         by_place: (-hessian, -mixed),
         by_direction: (hessian * turn * spun_rad, turn.tr_mul(&mixed) * spun_rad + turn.tr_mul(force)),
-        by_stick: (Vec3::zeros(), 0.0),
+        by_stick,
     }
 }

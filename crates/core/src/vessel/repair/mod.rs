@@ -20,7 +20,7 @@ mod overlap_tests;
 mod pieces;
 mod seams;
 #[cfg(test)]
-mod shapes;
+pub(super) mod shapes;
 mod sheets;
 #[cfg_attr(not(feature = "union"), path = "no_solid.rs")]
 mod solid;

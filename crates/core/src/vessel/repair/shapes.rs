@@ -6,7 +6,7 @@ use crate::Vec3;
 use crate::vessel::{SurfaceMesh, Wall, any_perpendicular};
 
 /// Appends a surface with its own vertices.
-pub(super) fn add(mesh: &mut SurfaceMesh, other: &SurfaceMesh) {
+pub(in crate::vessel) fn add(mesh: &mut SurfaceMesh, other: &SurfaceMesh) {
     let first = mesh.vertices_mm.len() as u32;
     mesh.vertices_mm.extend(&other.vertices_mm);
     mesh.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|v| v + first)));

@@ -300,12 +300,12 @@ impl<const C: usize> Tape for Record<C> {
                 continue;
             }
             let own = std::mem::take(&mut waiting);
-            let wanted = own.iter().map(|one| one.wanted()).fold(Wanted::default(), |a, b| Wanted {
+            let unread = Wanted { hands: wants_hands, ..Wanted::default() };
+            let wanted = own.iter().map(|one| one.wanted()).fold(unread, |a, b| Wanted {
                 push: if a.push == Push::Unread { b.push } else { a.push },
                 energy: a.energy || b.energy,
-                hands: wants_hands,
+                hands: a.hands,
             });
-            let wanted = Wanted { hands: wants_hands, ..wanted };
             let surroundings = self.surroundings(first, command);
             let environment = Environment::new(&surroundings, &self.surface, &self.options);
             self.with_pieces(&mut workspace, (command, &environment), |workspace, pieces| {
